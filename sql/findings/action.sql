@@ -192,6 +192,12 @@ BEGIN
     IF becomes.chainage_from IS NULL OR becomes.chainage_to IS NULL OR becomes.chainage_from > becomes.chainage_to THEN
         RAISE EXCEPTION 'an action needs a finding, or chainage_from and a chainage_to that is not less' USING ERRCODE = 'invalid_parameter_value';
     END IF;
+    IF place.id IS NULL AND (becomes.chainage_from, becomes.chainage_to) IS DISTINCT FROM (was.chainage_from, was.chainage_to)
+       AND EXISTS (SELECT FROM tunnel_api.survey_ends(its.id) v
+                    WHERE becomes.chainage_from < v.chainage_from - 1 OR becomes.chainage_to > v.chainage_to + 1) THEN
+        RAISE EXCEPTION 'an action from chainage % to % is not within the survey', becomes.chainage_from, becomes.chainage_to
+            USING ERRCODE = 'invalid_parameter_value';
+    END IF;
     IF TG_OP = 'INSERT' THEN
         INSERT INTO tunnel.action (survey_id, finding_id, element, chainage_from, chainage_to, arc, measure, urgency, responsible, due, cost,
                                    currency, state, remark)

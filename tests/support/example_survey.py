@@ -13,11 +13,11 @@ from psycopg.conninfo import make_conninfo
 from shapely.geometry import Polygon, box
 
 from support.databases import create_database
+from support.example_action import add_action
 from support.example_alarm import add_alarms
 from support.example_clearance import add_clearance
 from support.example_deviation import add_deviation
 from support.example_objects import CORNER, HALF_FLOOR, SPHERES, THINGS, beside, boxed, relief
-from support.example_action import add_action
 from support.example_rating import add_rating
 from support.example_rings import add_rings
 from tunneldb.anomalies.geometries import anomaly_geometries

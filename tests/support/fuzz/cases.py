@@ -128,9 +128,10 @@ UNTRIED = {
 """Verbs that are in none of OF_WORDS, and why."""
 
 REFUSED = (
-    "actions remove", "alarms remove", "clearance", "compare", "elements remove", "evaluate", "export scan-2024", "findings undo",
-    "ground", "intensity", "learn demo-2024", "members demo", "profile remove", "rating change", "rating remove", "register", "run",
-    "serve", "spheres", "survey remove-file", "thickness", "tunnel add {new} {file}", "tunnel find-axis", "tunnel remove",
+    "actions remove", "alarms remove", "clearance", "compare", "elements remove", "evaluate", "export scan-2024",
+    "findings undo", "ground", "intensity", "learn demo-2024", "members demo", "profile remove", "rating change",
+    "rating remove", "register", "run", "serve", "spheres", "survey remove-file", "thickness", "tunnel add {new} {file}",
+    "tunnel find-axis", "tunnel remove",
 )  # fmt: skip
 """What right commands begin with that the survey made by hand has no rows for: they are to say so in one line."""
 
