@@ -376,7 +376,7 @@ class Reviews(Chapter):
 
     def __init__(self, facts: Facts) -> None:
         super().__init__(facts)
-        self.edits_in_all, self._edits = data.read_edits(facts.conn, facts.survey)
+        self.edits_in_all, self._edits = data.read_edits(facts.conn, facts.survey, facts.request.at)
 
     @property
     def people(self) -> Any:

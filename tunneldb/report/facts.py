@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import hashlib
 from dataclasses import dataclass
 from functools import cached_property
@@ -50,6 +51,10 @@ class Request:
         Format of the pictures.
     progress : callable
         Called after each strip.
+    at : datetime
+        Moment whose state is reported.
+    past : bool
+        True if that is not the present.
     """
 
     survey: Survey
@@ -62,6 +67,8 @@ class Request:
     pictures: int | None
     form: Form
     progress: Progress
+    at: dt.datetime
+    past: bool = False
 
 
 class Facts:
