@@ -140,8 +140,8 @@ def read_record(path: Path) -> Record:
     try:
         values = json.loads(text)
         return Record(
-            str(values["survey"]), float(values["low"]), float(values["high"]), dt.datetime.fromisoformat(values["at"]),
-            str(values["digest"]), bool(values["leaks"]), int(values["listed"]),
+            str(values["survey"]), values["low"] + 0.0, values["high"] + 0.0, dt.datetime.fromisoformat(values["at"]),
+            str(values["digest"]), bool(values["leaks"]), values["listed"] + 0,
             tuple(RatingRequest(one["scheme"], one["version"], one["elements"]) for one in values["ratings"]),
         )  # fmt: skip
     except (ValueError, KeyError, TypeError):
