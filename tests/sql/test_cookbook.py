@@ -695,6 +695,7 @@ def not_seen(rows: Rows, a: Asked) -> None:
     assert (row["chainage_from"], row["chainage_to"]) == example_change.UNSEEN
     close(row, 1, unseen_m2=example_change.GIRTH * (example_change.UNSEEN[1] - example_change.UNSEEN[0]))
 
+
 BLOCK = 50 * GIRTH
 """Lining of an element of the division ``blocks``, m²; of block 1 a fifth was not inspected."""
 

@@ -1,4 +1,4 @@
-"""What questions of owners ask of beyond drawn findings: a later inspection with ratings, a second scheme, actions, edits of them."""
+"""What questions of owners ask of beyond drawn findings: a later inspection, a second scheme, actions and edits of them."""
 
 from __future__ import annotations
 
