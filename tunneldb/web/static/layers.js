@@ -1,5 +1,6 @@
 /** Layers of the lining: image, findings, and a hatch where there is no image. */
 
+import { levelColour } from './levels.js';
 import { hatch } from './ribbon.js';
 import { findingsAddress, imageAddress, MAX_TILE_ZOOM, MIN_ZOOM, projection, resolutionAt, surveyExtent, tileGridOf } from './plane.js';
 
@@ -114,6 +115,48 @@ export function highlightLayer() {
     }),
   ];
   return new ol.layer.Vector({ source: new ol.source.Vector(), style, zIndex: 20 });
+}
+
+/** Return the layer of rated elements: features with element and levels. */
+export function ratingLayer() {
+  const styles = new Map();
+  const style = (feature) => {
+    const { element, levels } = feature.getProperties();
+    const key = `${element.level}|${element.complete}|${levels}|${element.name}|${element.result_text}`;
+    if (!styles.has(key)) styles.set(key, elementStyle(element, levels));
+    return styles.get(key);
+  };
+  return new ol.layer.Vector({ source: new ol.source.Vector(), style, zIndex: 1.5, declutter: true });
+}
+
+function elementStyle(element, levels) {
+  const colour = levelColour(element, levels) ?? '#8a6a3f';
+  const plain = element.level !== null && element.complete;
+  const fill = new ol.style.Fill({ color: plain ? levelColour(element, levels, 0.3) : stripes(levelColour(element, levels, 0.45)) });
+  const text = new ol.style.Text({
+    text: `${element.name}: ${element.result_text}`, font: '600 12px system-ui, sans-serif', fill: new ol.style.Fill({ color: '#1d2730' }),
+    backgroundFill: new ol.style.Fill({ color: 'rgba(255,255,255,.85)' }), padding: [2, 4, 1, 4],
+  });
+  return [new ol.style.Style({ stroke: stroke(WHITE, 4) }), new ol.style.Style({ fill, stroke: stroke(colour, 2), text })];
+}
+
+/** Return the pattern of a result that is a lower bound; without a colour, of what is not rated. */
+function stripes(colour) {
+  const tile = document.createElement('canvas');
+  tile.width = 12;
+  tile.height = 12;
+  const c = tile.getContext('2d');
+  c.fillStyle = colour ?? 'rgba(251,233,214,.55)';
+  c.fillRect(0, 0, 12, 12);
+  c.strokeStyle = colour ? 'rgba(255,255,255,.75)' : 'rgba(184,98,27,.8)';
+  c.lineWidth = 2;
+  c.beginPath();
+  for (const shift of [-12, 0, 12]) {
+    c.moveTo(shift - 2, 14);
+    c.lineTo(shift + 14, -2);
+  }
+  c.stroke();
+  return c.createPattern(tile, 'repeat');
 }
 
 /** Return the geometry of a finding's outline. */
