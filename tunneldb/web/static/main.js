@@ -30,7 +30,7 @@ const node = (id) => document.getElementById(id);
 const user = meta('user');
 const canWrite = ['inspector', 'operator'].includes(meta('role'));
 
-const app = { surveys: [], survey: null, summary: null, finding: null, routing: false, turn: 0, hash: '' };
+const app = { surveys: [], survey: null, summary: null, finding: null, element: null, routing: false, turn: 0, hash: '' };
 
 function say(text, wrong = false) {
   const state = node('state');
@@ -107,8 +107,12 @@ const rating = new RatingPanel({
   },
   on: () => showElements(),
   go: (element) => {
-    if (space.open) space.go((element.chainage_from + element.chainage_to) / 2);
-    else lining.showElement(element);
+    if (space.open) {
+      space.go((element.chainage_from + element.chainage_to) / 2);
+      return;
+    }
+    lining.showElement(element);
+    app.element = element;
   },
 });
 const actions = new ActionsPanel({ canWrite, say, current: () => session.facts, changed: (found) => review.takeActions(found) });
@@ -205,7 +209,11 @@ function changed(wait = null) {
 
 /** Show the results of elements on the lining while the rating is open. */
 function showElements() {
-  lining.showRating(panel.tab === 'rating' && rating.coloured ? rating.rating : null);
+  const open = panel.tab === 'rating';
+  lining.showRating(open && rating.coloured ? rating.rating : null);
+  if (open || !app.element) return;
+  app.element = null;
+  lining.mark(session.facts);
 }
 
 /** Show an action, or the form of a new one for the finding that is shown. */
