@@ -31,9 +31,7 @@ def schemes(conn: psycopg.Connection[Any]) -> list[dict[str, Any]]:
     )
 
 
-def rating(
-    conn: psycopg.Connection[Any], survey: Place, element_set: str, scheme: str, version: str
-) -> list[dict[str, Any]]:
+def rating(conn: psycopg.Connection[Any], survey: Place, element_set: str, scheme: str, version: str) -> list[dict[str, Any]]:
     """Return the rating of each element; boxes are its rectangles: chainage and arc from, chainage and arc to, m."""
     return named(
         conn.execute(
@@ -48,9 +46,7 @@ def rating(
     )
 
 
-def change(
-    conn: psycopg.Connection[Any], survey: Place, element_set: str, scheme: str, version: str
-) -> list[dict[str, Any]]:
+def change(conn: psycopg.Connection[Any], survey: Place, element_set: str, scheme: str, version: str) -> list[dict[str, Any]]:
     """Return the change of each element's rating since the earlier inspection of the tunnel."""
     return named(
         conn.execute(
