@@ -62,6 +62,8 @@ def test_actions_are_added_changed_listed_and_removed(two: list[int], conn: psyc
     assert (shown[1]["state"], shown[1]["responsible"], shown[1]["chainage_from"]) == ("ordered", "Works Ltd", 12310)
     late = done("actions", "list", "demo", "--overdue").output
     assert "2020-03-31, overdue" in late
+    assert f"finding {shown[0]['finding_id']}" in late
+    assert "element block 1" in done("actions", "list", "demo", "--state", "ordered").output
     assert "1200.50 EUR" in late
     assert "Clean" not in late
     assert "not compared" in late
@@ -75,6 +77,7 @@ def test_actions_are_added_changed_listed_and_removed(two: list[int], conn: psyc
     [
         (["add", NAME, "--finding", "1"], "--measure is missing"),
         (["add", NAME, "--measure", "x"], "either --finding ID, or --from and --to"),
+        (["add", NAME, "--measure", "x", "--element", "block 1"], "--from and --to, also with --element"),
         (["add", NAME, "--measure", "x", "--finding", "1", "--from", "12+310"], "either --finding ID, or --from and --to"),
         (["add", NAME, "--measure", "x", "--finding", "999999"], "the survey has no finding 999999"),
         (["add", NAME, "--measure", "x", "--finding", "1", "--cost", "12"], "a cost needs its currency"),

@@ -96,23 +96,23 @@ def actions() -> None:
 @click.option("--overdue", is_flag=True, help="Only actions that are open or ordered after their due date.")
 @click.pass_obj
 def list_(settings: Settings, tunnel: str, survey: str | None, states: tuple[str, ...], overdue: bool) -> None:
-    """List the actions of TUNNEL by due date, with what became of each leak in later surveys.
+    """List the actions of TUNNEL by due date, with the state of each leak in later surveys.
 
     A later survey is included if it was compared with the survey of the action (tunneldb compare).
     """
     rows = _read(settings, tunnel, states, overdue, survey)
     add_to_json(tunnel=tunnel, actions=rows)
     print_table(
-        ["id", "place", "finding", "measure", "urgency", "responsible", "due", "cost", "state", "follow-up"],
+        ["id", "place", "subject", "measure", "urgency", "responsible", "due", "cost", "state", "follow-up"],
         [
             (
-                row["id"], row["label"], row["finding_id"] or row["element"] or "", row["measure"], row["urgency"],
+                row["id"], row["label"], _subject(row), row["measure"], row["urgency"],
                 row["responsible"] or "", f"{row['due']}, overdue" if row["overdue"] else row["due"] or "",
                 f"{row['cost']} {row['currency']}" if row["cost"] is not None else "", row["state"], row["follow_up"] or "",
             )
             for row in rows
         ],
-        right=(0, 2, 7),
+        right=(0, 7),
     )  # fmt: skip
     late = sum(bool(row["overdue"]) for row in rows)
     notify(f"{counted(len(rows), 'action')}, {late} overdue")
@@ -126,7 +126,7 @@ def list_(settings: Settings, tunnel: str, survey: str | None, states: tuple[str
 )
 @click.argument("survey")
 @click.option("--finding", "finding_id", type=int, metavar="ID", help="Finding that it is about; gives its place.")
-@click.option("--element", metavar="NAME", help="Name of the element that it is about.")
+@click.option("--element", metavar="NAME", help="Name of the element that it is about; --from and --to give its place.")
 @stretch_options
 @_given
 @click.pass_obj
@@ -148,7 +148,7 @@ def add(
     if not values.get("measure"):
         raise UserError("--measure is missing: what is to be done")
     if (finding_id is None) == (start is None and end is None):
-        raise UserError("give either --finding ID, or --from and --to")
+        raise UserError("give either --finding ID, or --from and --to, also with --element")
     with connect(settings.dsn) as conn:
         found = get_survey(conn, survey)
         values |= {"finding_id": finding_id, "element": element}
@@ -231,6 +231,13 @@ def import_(settings: Settings, tunnel: str, file: Path) -> None:
         done = read_actions(conn, get_tunnel(conn, tunnel), file)
     add_to_json(tunnel=tunnel, added=done.added, changed=done.changed, unchanged=done.unchanged)
     notify(f"{done.added} added, {done.changed} changed, {done.unchanged} unchanged")
+
+
+def _subject(row: dict[str, Any]) -> str:
+    """Return the finding or element of an action as text; an element's name can be a number, too."""
+    if row["finding_id"] is not None:
+        return f"finding {row['finding_id']}"
+    return f"element {row['element']}" if row["element"] else ""
 
 
 def _read(settings: Settings, tunnel: str, states: tuple[str, ...], overdue: bool, survey: str | None) -> list[dict[str, Any]]:
