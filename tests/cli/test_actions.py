@@ -12,6 +12,7 @@ import openpyxl
 import psycopg
 import pytest
 from click.testing import CliRunner, Result
+from support.example_change import add_change
 from support.example_survey import NAME
 
 from tunneldb.cli.main import main
@@ -70,6 +71,19 @@ def test_actions_are_added_changed_listed_and_removed(two: list[int], conn: psyc
     assert "Inject" not in done("actions", "list", "demo", "--state", "ordered").output
     done("actions", "remove", str(first))
     assert [row[0] for row in rows(conn)] == [second]
+
+
+def test_a_done_action_whose_leak_is_still_wet_is_named(two: list[int], conn: psycopg.Connection) -> None:
+    """Leak 2 is dry in the later survey, and leak 3 is as it was."""
+    add_change(conn, NAME)
+    conn.commit()
+    assert "wet in a later survey" not in done("actions", "list", "demo").output
+    for finding in ("2", "3"):
+        done("actions", "add", NAME, "--finding", finding, "--measure", "inject", "--state", "done")
+    result = done("actions", "list", "demo", "--state", "done")
+    assert "dry since 2026-05-04" in result.output
+    key = max(row[0] for row in rows(conn))
+    assert f"done, but wet in a later survey: 1 action ({key})" in result.stderr
 
 
 @pytest.mark.parametrize(

@@ -64,7 +64,8 @@ def rated_by_the_page(name: str, conn: psycopg.Connection, folder: Path) -> dict
     done("rating", "add", str(path))
     for severity, line in ((None, "LINESTRING(12355 0, 12358 0)"), (3, "LINESTRING(12408 0, 12409 0)")):
         conn.execute(
-            "INSERT INTO tunnel_api.finding_unrolled (survey, kind, severity, width_mm, geom) VALUES (%s, 'crack', %s, 0.6, %s)",
+            "INSERT INTO tunnel_api.finding_unrolled (survey, kind, severity, width_mm, geom)"
+            " VALUES (%s, 'crack', %s, 0.6, %s)",
             [NAME, severity, line],
         )
     conn.commit()

@@ -116,6 +116,9 @@ def list_(settings: Settings, tunnel: str, survey: str | None, states: tuple[str
     )  # fmt: skip
     late = sum(bool(row["overdue"]) for row in rows)
     notify(f"{counted(len(rows), 'action')}, {late} overdue")
+    wet = [str(row["id"]) for row in rows if row["state"] in ("done", "verified") and _is_wet(row["follow_up"])]
+    if wet:
+        notify(f"done, but wet in a later survey: {counted(len(wet), 'action')} ({', '.join(wet)})")
 
 
 @actions.command(
@@ -231,6 +234,11 @@ def import_(settings: Settings, tunnel: str, file: Path) -> None:
         done = read_actions(conn, get_tunnel(conn, tunnel), file)
     add_to_json(tunnel=tunnel, added=done.added, changed=done.changed, unchanged=done.unchanged)
     notify(f"{done.added} added, {done.changed} changed, {done.unchanged} unchanged")
+
+
+def _is_wet(follow_up: str | None) -> bool:
+    """Return True if a leak is still wet in a later survey."""
+    return (follow_up or "").startswith(("grown ", "same ", "shrunk "))
 
 
 def _subject(row: dict[str, Any]) -> str:
