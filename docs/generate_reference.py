@@ -59,6 +59,8 @@ def _command(command: click.Command, name: str) -> Iterator[str]:
     if isinstance(command, Command):
         if command.wrong:
             yield f"Exit code 1: {command.wrong}."
+        if command.codes:
+            yield "Exit codes: " + "; ".join(f"{code}: {text}" for code, text in command.codes.items()) + "."
         yield "\n".join(["```sh", *command.examples, "```"])
 
 

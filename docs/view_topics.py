@@ -23,6 +23,7 @@ TOPICS = {
     "Rings": ("rings",),
     "Elements and ratings": ("rating", "rating_layer"),
     "Actions": ("action",),
+    "Alarms": ("alarms",),
     "Structures": ("structures",),
     "Under water": ("sonar", "closed_section"),
     "Stages and queue": ("status", "state", "queue", "remark", "size"),

@@ -1,5 +1,14 @@
 -- Written from tunneldb/database/models/ by scripts/write_tables.py; do not edit.
 
+CREATE TABLE tunnel.as_of (
+    id BIGINT GENERATED ALWAYS AS IDENTITY,
+    moment TIMESTAMP WITH TIME ZONE NOT NULL,
+    CONSTRAINT as_of_pkey PRIMARY KEY (id)
+);
+COMMENT ON TABLE tunnel.as_of IS 'Empty: a row marks a transaction that shows the past, and a trigger refuses its commit';
+COMMENT ON COLUMN tunnel.as_of.id IS 'Key';
+COMMENT ON COLUMN tunnel.as_of.moment IS 'Moment that is shown';
+
 CREATE TABLE tunnel.feature_list (
     id INTEGER GENERATED ALWAYS AS IDENTITY,
     names TEXT[] NOT NULL,
@@ -246,6 +255,51 @@ CREATE INDEX entry_part_of_idx ON tunnel_audit.entry (part_of) WHERE part_of IS 
 CREATE INDEX entry_survey_at_idx ON tunnel_audit.entry (survey, at);
 CREATE INDEX entry_undoes_idx ON tunnel_audit.entry (undoes) WHERE undoes IS NOT NULL;
 CREATE INDEX entry_view_row_id_idx ON tunnel_audit.entry (view, row_id);
+
+CREATE TABLE tunnel.alarm_limit (
+    id INTEGER GENERATED ALWAYS AS IDENTITY,
+    tunnel_id INTEGER NOT NULL,
+    name TEXT NOT NULL,
+    quantity TEXT NOT NULL,
+    chainage_from DOUBLE PRECISION,
+    chainage_to DOUBLE PRECISION,
+    step DOUBLE PRECISION,
+    clock_from DOUBLE PRECISION,
+    clock_to DOUBLE PRECISION,
+    reference TEXT,
+    min_inspected DOUBLE PRECISION DEFAULT 0.95 NOT NULL,
+    warning DOUBLE PRECISION NOT NULL,
+    alarm DOUBLE PRECISION NOT NULL,
+    added_at TIMESTAMP WITH TIME ZONE DEFAULT clock_timestamp() NOT NULL,
+    CONSTRAINT alarm_limit_pkey PRIMARY KEY (id),
+    CONSTRAINT alarm_limit_tunnel_id_name_key UNIQUE (tunnel_id, name),
+    CONSTRAINT alarm_limit_name_at_most_100_characters_check CHECK (char_length(name) <= 100),
+    CONSTRAINT alarm_limit_reference_at_most_200_characters_check CHECK (char_length(reference) <= 200),
+    CONSTRAINT alarm_limit_quantity_check CHECK (quantity IN ('ovality', 'convergence', 'wet_area', 'growth')),
+    CONSTRAINT alarm_limit_place_check CHECK (chainage_from >= '-100000000'::float8 AND chainage_from <= '100000000'::float8 AND chainage_to >= '-100000000'::float8 AND chainage_to <= '100000000'::float8),
+    CONSTRAINT alarm_limit_order_check CHECK (chainage_from < chainage_to),
+    CONSTRAINT alarm_limit_step_check CHECK ((step IS NOT NULL) = (quantity IN ('wet_area', 'growth')) AND step >= 1 AND step <= '1000000'::float8),
+    CONSTRAINT alarm_limit_clock_check CHECK ((clock_from IS NOT NULL) = (quantity = 'convergence') AND (clock_to IS NOT NULL) = (quantity = 'convergence') AND clock_from >= 0 AND clock_from <= 12 AND clock_to >= 0 AND clock_to <= 12 AND abs(abs(clock_from - clock_to) - 6) <= '0.05'::float8),
+    CONSTRAINT alarm_limit_reference_check CHECK (reference IS NULL OR quantity = 'convergence'),
+    CONSTRAINT alarm_limit_min_inspected_check CHECK (min_inspected >= 0 AND min_inspected <= 1),
+    CONSTRAINT alarm_limit_limits_check CHECK (warning > 0 AND alarm >= warning AND alarm <= '100000000'::float8),
+    CONSTRAINT alarm_limit_tunnel_id_fkey FOREIGN KEY(tunnel_id) REFERENCES tunnel.tunnel (id) ON DELETE CASCADE
+);
+COMMENT ON TABLE tunnel.alarm_limit IS 'Limits of series of tunnels: values that are a warning or an alarm';
+COMMENT ON COLUMN tunnel.alarm_limit.id IS 'Key';
+COMMENT ON COLUMN tunnel.alarm_limit.tunnel_id IS 'Tunnel that the row belongs to';
+COMMENT ON COLUMN tunnel.alarm_limit.name IS 'Name';
+COMMENT ON COLUMN tunnel.alarm_limit.quantity IS 'ovality (of each ring, share of the design diameter), convergence (change of a chord since the reference survey, m, either sign), wet_area (of each stretch, m²) or growth (of the wet area of each stretch since the earlier inspection, m² per year)';
+COMMENT ON COLUMN tunnel.alarm_limit.chainage_from IS 'Chainage from which it applies, m; NULL: beginning of the tunnel';
+COMMENT ON COLUMN tunnel.alarm_limit.chainage_to IS 'Chainage up to which it applies, m; NULL: end of the tunnel';
+COMMENT ON COLUMN tunnel.alarm_limit.step IS 'Length of the stretches of wet_area and growth, from multiples of it, m';
+COMMENT ON COLUMN tunnel.alarm_limit.clock_from IS 'Clock position of one end of the chord of convergence, hours';
+COMMENT ON COLUMN tunnel.alarm_limit.clock_to IS 'Clock position of the other end, opposite, hours';
+COMMENT ON COLUMN tunnel.alarm_limit.reference IS 'Name of the survey since which convergence counts; NULL: the earliest that another one was compared with';
+COMMENT ON COLUMN tunnel.alarm_limit.min_inspected IS 'Inspected share below which a value below the limits is no all-clear, 0 to 1';
+COMMENT ON COLUMN tunnel.alarm_limit.warning IS 'Value from which it is a warning, in the unit of the quantity';
+COMMENT ON COLUMN tunnel.alarm_limit.alarm IS 'Value from which it is an alarm, in the unit of the quantity';
+COMMENT ON COLUMN tunnel.alarm_limit.added_at IS 'Time when it was added';
 
 CREATE TABLE tunnel.alignment_element (
     tunnel_id INTEGER NOT NULL,

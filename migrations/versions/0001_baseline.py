@@ -23,7 +23,7 @@ COMMENT ON SCHEMA tunnel IS 'Data of tunneldb; read and edit it through schema t
 COMMENT ON SCHEMA tunnel_audit IS 'What people changed by hand; read it through tunnel_api.audit';
 COMMENT ON SCHEMA tunnel_queue IS 'Jobs of tunneldb''s batches, kept by procrastinate; read them through tunnel_api.job';
 """
-FILES = ("functions", "tables", "partitions", "run", "finding", "waterproof", "audit")
+FILES = ("functions", "tables", "partitions", "run", "finding", "waterproof", "as_of", "audit")
 
 
 def upgrade() -> None:

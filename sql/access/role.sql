@@ -111,7 +111,8 @@ BEGIN
                                   currency, state, remark) ON
         tunnel_api.action, tunnel_api.action_map, tunnel_api.action_unrolled TO tunnel_inspector;
     GRANT EXECUTE ON FUNCTION tunnel_api.finding_split(bigint, geometry), tunnel_api.finding_merge(bigint[]),
-        tunnel_api.finding_undo(bigint), tunnel_api.finding_photo_add(bigint, bytea, text) TO tunnel_inspector;
+        tunnel_api.finding_undo(bigint), tunnel_api.finding_photo_add(bigint, bytea, text),
+        tunnel_api.show_as_of(text, timestamptz) TO tunnel_inspector;
 END
 $$;
 

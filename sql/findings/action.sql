@@ -38,7 +38,7 @@ LANGUAGE sql STABLE STRICT PARALLEL SAFE SECURITY DEFINER SET search_path = pg_c
                          WHERE l.back = 1 AND l.state = 'unseen' AND EXISTS (SELECT FROM last)), '')
 $$;
 COMMENT ON FUNCTION tunnel_internal.follow_up(int, bigint) IS
-'What became of a leak in later surveys, from their comparisons (tunneldb compare): dry since a date, grown, same or shrunk with areas (m²); not inspected; not compared';
+'State of a leak in later surveys, from their comparisons (tunneldb compare): dry since a date, grown, same or shrunk with areas (m²); not inspected; not compared';
 
 CREATE OR REPLACE VIEW tunnel_api.action AS
 SELECT a.id, a.survey_id, s.name AS survey, s.tunnel_id, t.name AS tunnel, a.finding_id,
@@ -92,7 +92,7 @@ BEGIN
         ('state', 'open, ordered, done or verified'),
         ('remark', 'Remark'),
         ('photos', 'Number of photos of the finding (finding_photo)'),
-        ('follow_up', 'What became of the leak in later surveys that were compared with this one: dry since a date, grown, same, shrunk, not inspected or not compared; NULL without a finding'),
+        ('follow_up', 'State of the leak in later surveys that were compared with this one: dry since a date, grown, same, shrunk, not inspected or not compared; NULL without a finding'),
         ('added_by', 'Role that added it, set by the database'),
         ('added_at', 'Time when it was added, set by the database'),
         ('changed_by', 'Role that changed it last, set by the database'),
@@ -191,6 +191,12 @@ BEGIN
     END IF;
     IF becomes.chainage_from IS NULL OR becomes.chainage_to IS NULL OR becomes.chainage_from > becomes.chainage_to THEN
         RAISE EXCEPTION 'an action needs a finding, or chainage_from and a chainage_to that is not less' USING ERRCODE = 'invalid_parameter_value';
+    END IF;
+    IF place.id IS NULL AND (becomes.chainage_from, becomes.chainage_to) IS DISTINCT FROM (was.chainage_from, was.chainage_to)
+       AND EXISTS (SELECT FROM tunnel_api.survey_ends(its.id) v
+                    WHERE becomes.chainage_from < v.chainage_from - 1 OR becomes.chainage_to > v.chainage_to + 1) THEN
+        RAISE EXCEPTION 'an action from chainage % to % is not within the survey', becomes.chainage_from, becomes.chainage_to
+            USING ERRCODE = 'invalid_parameter_value';
     END IF;
     IF TG_OP = 'INSERT' THEN
         INSERT INTO tunnel.action (survey_id, finding_id, element, chainage_from, chainage_to, arc, measure, urgency, responsible, due, cost,

@@ -63,7 +63,7 @@ LANGUAGE sql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_te
     WITH stood AS MATERIALIZED (
         SELECT e.* FROM tunnel_audit.entry e
          WHERE e.view = 'finding' AND e.row_id = $1 AND e.id < $2.id AND e.undoes IS NULL
-           AND NOT EXISTS (SELECT FROM tunnel_audit.entry u WHERE u.undoes = e.id)
+           AND NOT EXISTS (SELECT FROM tunnel_audit.entry u WHERE u.undoes = e.id AND u.id < $2.id)
     )
     UPDATE tunnel.finding a
        SET drawn_by = CASE WHEN a.origin <> 'detected' THEN coalesce(d.who, a.drawn_by, session_user) END,
@@ -77,7 +77,7 @@ LANGUAGE sql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_te
      WHERE a.id = $1
 $$;
 COMMENT ON FUNCTION tunnel_internal.stamp_finding(bigint, tunnel_audit.entry) IS
-    'Restore the roles and times of a finding''s last drawing and review before a step, from the audit; only finding_undo calls it';
+    'Restore the roles and times of a finding''s last drawing and review before a step, from the audit';
 
 -- Restore the columns of a finding before a step.
 CREATE OR REPLACE FUNCTION tunnel_internal.restore_finding(finding_id bigint, step tunnel_audit.entry) RETURNS void
@@ -111,7 +111,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.restore_finding(bigint, tunnel_audit.entry) IS
-    'Restore the columns, the outline and the measured values of a finding before a step; only finding_undo calls it';
+    'Restore the columns, the outline and the measured values of a finding before a step';
 
 -- Restore a deleted finding with its photos.
 CREATE OR REPLACE FUNCTION tunnel_internal.revive_finding(survey_id int, step tunnel_audit.entry) RETURNS void
@@ -133,7 +133,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.revive_finding(int, tunnel_audit.entry) IS
-    'Restore a deleted finding with its id and photos; only finding_undo calls it';
+    'Restore a deleted finding with its id and photos';
 
 CREATE OR REPLACE FUNCTION tunnel_api.finding_undo(id bigint) RETURNS text
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$

@@ -1,4 +1,5 @@
--- Statistics of leaks over stretches of a survey, and over rings. Needs waterproof_limit, slide_window and stretch_leaks.
+-- Statistics of leaks over stretches of a survey, and over rings. Needs waterproof_limit, slide_window, stretch_leaks
+-- and stretch_bands.
 
 -- Statistics of stretches of a survey, given by their beginnings, in growing order, and ends; they do not overlap.
 --
@@ -76,16 +77,8 @@ BEGIN
         LEFT JOIN slid w ON w.n = p.n
         WHERE w.n IS NULL OR (p.a < p.b AND p.a <= w.b AND p.b >= w.a)
         GROUP BY p.n
-    ), band AS (  -- dark bands that may be wet or dirty
-        SELECT b.chainage_from AS low, b.chainage_to AS high, b.area, generate_series(
-            greatest(width_bucket(b.chainage_from, starts), 1), width_bucket(b.chainage_to, starts)) AS n
-        FROM tunnel_api.dark_band b
-        WHERE b.survey_id = survey_key AND NOT b.decided AND b.chainage_to > first_start AND b.chainage_from < last_end
     ), undecided AS (
-        SELECT b.n, sum(b.area * (least(b.high, ends[b.n]) - greatest(b.low, starts[b.n])) / (b.high - b.low)) AS area,
-            max(b.area) AS largest, count(*)::int AS bands
-        FROM band b WHERE b.high > starts[b.n] AND b.low < ends[b.n]
-        GROUP BY b.n
+        SELECT u.* FROM tunnel_internal.stretch_bands(survey_key, starts, ends) u
     ), result AS (
         SELECT s.n, s.low, s.high, nullif(s.b - s.a, 0) AS lining, s.seen,
             CASE WHEN coalesce(s.looked_at, 0) > 0 THEN s.seen / nullif(s.b - s.a, 0) * least(s.looked_at / (s.high - s.low), 1)

@@ -56,3 +56,22 @@ END
 $$;
 COMMENT ON FUNCTION tunnel_internal.stretch_leaks(int, float8[], float8[]) IS
 'Leaks in stretches of a survey: number of the stretch, from 1; id; area of the whole leak and of its part in the stretch (m²); lining from the beginning of the survey to both ends of that part (m²), 0 if no lining is known';
+
+
+CREATE OR REPLACE FUNCTION tunnel_internal.stretch_bands(survey_id int, starts float8[], ends float8[])
+RETURNS TABLE (n int, area float8, largest float8, bands int)
+LANGUAGE sql STABLE PARALLEL SAFE STRICT
+ROWS 10
+SECURITY DEFINER SET search_path = pg_catalog, pg_temp
+AS $$
+    SELECT b.n, sum(b.area * (least(b.high, $3[b.n]) - greatest(b.low, $2[b.n])) / (b.high - b.low)), max(b.area), count(*)::int
+    FROM (
+        SELECT d.chainage_from AS low, d.chainage_to AS high, d.area, generate_series(
+            greatest(width_bucket(d.chainage_from, $2), 1), width_bucket(d.chainage_to, $2)) AS n
+        FROM tunnel_api.dark_band d
+        WHERE d.survey_id = $1 AND NOT d.decided AND d.chainage_to > $2[1] AND d.chainage_from < $3[cardinality($3)]) b
+    WHERE b.high > $2[b.n] AND b.low < $3[b.n]
+    GROUP BY b.n
+$$;
+COMMENT ON FUNCTION tunnel_internal.stretch_bands(int, float8[], float8[]) IS
+'Dark bands that may be wet or dirty (dark_band) in stretches of a survey: number of the stretch, from 1; area in the stretch and of the largest whole band (m²); number of bands';

@@ -162,28 +162,68 @@ $$;
 COMMENT ON FUNCTION tunnel_api.change_at(text, float8, float8) IS
 'Change of the lining at a place (chainage and arc of the older survey, m) in each survey that was compared with it, by date: mean over the length of the section, m, positive inwards, without rigid motion; NULL if not inspected. lod: level of detection of a single cell, m';
 
--- Nodes of a section lie at each whole degree from -180 to 180.
-CREATE OR REPLACE FUNCTION tunnel_internal.arc_at_clock(survey_id int, chainage float8, clock float8) RETURNS float8
-LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
-    SELECT s.arc[floor(d.degree)::int + 181] + (d.degree - floor(d.degree))
-           * (s.arc[least(floor(d.degree)::int + 182, 361)] - s.arc[floor(d.degree)::int + 181])
-      FROM (SELECT ($3 * 30 + 180) - 360 * floor(($3 * 30 + 180) / 360) - 180 AS degree) d
-     CROSS JOIN LATERAL (SELECT c.arc FROM tunnel.section c
-                          WHERE c.survey_id = $1 AND c.chainage BETWEEN $2 - 10 AND $2 + 10
-                          ORDER BY abs(c.chainage - $2) LIMIT 1) s
+-- Nodes of a section lie at each whole degree from -180 to 180. The arcs of a clock position are interpolated once for each
+-- section, not for each place.
+CREATE OR REPLACE FUNCTION tunnel_internal.convergence_at(old_id int, survey_ids int[], places float8[], clock_from float8, clock_to float8)
+RETURNS TABLE (n int, survey_id int, convergence float8)
+LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT ROWS 100 SECURITY DEFINER SET search_path = pg_catalog, pg_temp SET jit = off AS $$
+#variable_conflict use_column
+DECLARE
+    old_key constant int := old_id;
+    wanted constant float8[] := places;
+    lowest constant float8 := (SELECT min(p) - 10 FROM unnest(places) p);
+    highest constant float8 := (SELECT max(p) + 10 FROM unnest(places) p);
+    -- degrees from the crown, -180 to 180
+    degrees constant float8[] := (
+        SELECT array_agg(d.degree - 360 * floor(d.degree / 360) - 180 ORDER BY d.n)
+          FROM (VALUES (1, clock_from * 30 + 180), (2, clock_to * 30 + 180)) AS d (n, degree));
+    nodes constant int[] := ARRAY[floor(degrees[1]) + 181, floor(degrees[2]) + 181];
+BEGIN
+    RETURN QUERY
+    WITH curve AS MATERIALIZED (  -- [:] takes the arcs out of their storage once
+        SELECT c.chainage, c.arc[:] AS arc FROM tunnel.section c
+         WHERE c.survey_id = old_key AND c.chainage >= lowest AND c.chainage <= highest
+    ), known AS MATERIALIZED (
+        SELECT array_agg(c.chainage ORDER BY c.chainage) AS chainage,
+               array_agg(c.arc[nodes[1]] + (degrees[1] - floor(degrees[1])) * (c.arc[least(nodes[1] + 1, 361)] - c.arc[nodes[1]])
+                         ORDER BY c.chainage) AS first,
+               array_agg(c.arc[nodes[2]] + (degrees[2] - floor(degrees[2])) * (c.arc[least(nodes[2] + 1, 361)] - c.arc[nodes[2]])
+                         ORDER BY c.chainage) AS second
+          FROM curve c
+    ), chord AS MATERIALIZED (  -- of the section nearest to each place, if it lies within 10 m
+        SELECT q.n, q.chainage, q.first, q.second
+          FROM (SELECT p.n, p.chainage, k.first[i.k] AS first, k.second[i.k] AS second, abs(k.chainage[i.k] - p.chainage) AS away
+                  FROM known k CROSS JOIN unnest(wanted) WITH ORDINALITY AS p (chainage, n)
+                 CROSS JOIN LATERAL (SELECT width_bucket(p.chainage, k.chainage) AS below) w
+                 CROSS JOIN LATERAL (
+                       SELECT CASE WHEN w.below = 0
+                                     OR k.chainage[w.below + 1] - p.chainage < p.chainage - k.chainage[w.below]
+                                   THEN w.below + 1 ELSE w.below END AS k) i) q
+         WHERE q.away <= 10
+    )
+    SELECT c.n::int, s.id,
+           -(nullif(x.change[floor((c.first - x.arc_from) / x.cell)::int + 1], 'NaN')::float8
+             + nullif(x.change[floor((c.second - x.arc_from) / x.cell)::int + 1], 'NaN')::float8)
+      FROM chord c CROSS JOIN unnest(survey_ids) AS s (id)
+     CROSS JOIN LATERAL (SELECT o.* FROM tunnel.change_section o
+                          WHERE o.survey_id = s.id AND o.old_survey_id = old_key AND o.chainage_from <= c.chainage
+                          ORDER BY o.chainage_from DESC LIMIT 1) x
+     WHERE x.chainage_to > c.chainage;
+END
 $$;
-COMMENT ON FUNCTION tunnel_internal.arc_at_clock(int, float8, float8) IS
-'Arc (m from the crown) at a clock position (hours) of the section nearest to a chainage (m); NULL if no section lies within 10 m';
+COMMENT ON FUNCTION tunnel_internal.convergence_at(int, int[], float8[], float8, float8) IS
+'Change of the length of the chord between two opposite clock positions (hours) since an older survey, m, at places (chainages, m) in later surveys; negative if the walls approach each other, NULL if an end is not inspected. No row where a survey was not compared';
 
 CREATE OR REPLACE FUNCTION tunnel_api.convergence(old_survey text, chainage float8, clock_from float8 DEFAULT 9, clock_to float8 DEFAULT 3)
 RETURNS TABLE (survey text, date date, convergence float8)
 LANGUAGE sql STABLE PARALLEL SAFE STRICT ROWS 10 SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
-    SELECT a.survey, a.date, -(a.change + b.change)
-      FROM (SELECT tunnel_internal.arc_at_clock(tunnel_api.survey_id($1), $2, $3) AS first,
-                   tunnel_internal.arc_at_clock(tunnel_api.survey_id($1), $2, $4) AS second) p
-     CROSS JOIN LATERAL tunnel_api.change_at($1, $2, p.first) a
-      JOIN LATERAL tunnel_api.change_at($1, $2, p.second) b ON b.survey = a.survey
-     ORDER BY a.date, a.survey
+    SELECT s.name, s.date, c.convergence
+      FROM tunnel.survey o
+     CROSS JOIN LATERAL tunnel_internal.convergence_at(
+           o.id, (SELECT array_agg(n.id) FROM tunnel.survey n WHERE n.tunnel_id = o.tunnel_id), ARRAY[$2], $3, $4) c
+      JOIN tunnel.survey s ON s.id = c.survey_id
+     WHERE o.id = tunnel_api.survey_id($1)
+     ORDER BY s.date, s.name
 $$;
 
 COMMENT ON FUNCTION tunnel_api.convergence(text, float8, float8, float8) IS

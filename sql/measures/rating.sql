@@ -199,7 +199,7 @@ BEGIN
       FROM tunnel.survey s JOIN tunnel.element_set d ON d.tunnel_id = s.tunnel_id
      WHERE s.id = tunnel_api.survey_id(element_set_id.survey) AND d.name = element_set_id.element_set;
     IF found IS NULL THEN
-        RAISE EXCEPTION 'the tunnel of survey % has no elements named %', survey, element_set
+        RAISE EXCEPTION 'the tunnel of survey % has no elements named %', survey, left(element_set, 63)
             USING ERRCODE = 'no_data_found', HINT = 'tunneldb elements list shows them';
     END IF;
     RETURN found;
@@ -243,7 +243,7 @@ BEGIN
      WHERE r.name = rating_scheme_id.scheme AND (rating_scheme_id.version IS NULL OR r.version = rating_scheme_id.version)
      ORDER BY r.added_at DESC, r.id DESC LIMIT 1;
     IF found IS NULL THEN
-        RAISE EXCEPTION 'there is no rating scheme % %', scheme, coalesce(version, '')
+        RAISE EXCEPTION 'there is no rating scheme % %', left(scheme, 63), left(coalesce(version, ''), 63)
             USING ERRCODE = 'no_data_found', HINT = 'tunneldb rating list shows them';
     END IF;
     RETURN found;

@@ -37,6 +37,8 @@ def refused(*words: str) -> str:
 @pytest.fixture
 def two(dsn: str, example: str, conn: psycopg.Connection) -> list[int]:
     """Ids of two actions: of a leak, overdue; and of a stretch."""
+    conn.execute("DELETE FROM tunnel.action")
+    conn.commit()
     (leak,) = conn.execute("SELECT min(id) FROM tunnel_api.finding WHERE survey = %s AND wet AND counted", [NAME]).fetchone()  # type: ignore[misc]
     words = ["--measure", "Inject the joint", "--urgency", "urgent", "--due", "2020-03-31", "--cost", "1200.50 EUR"]
     done("actions", "add", NAME, "--finding", str(leak), *words)

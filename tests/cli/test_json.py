@@ -72,6 +72,15 @@ def test_what_is_listed_is_what_the_views_hold(example: str, conn: psycopg.Conne
     ratings = told(0, "rating", "apply", example, "--elements", "blocks", "--scheme", "example")["ratings"]
     held = rows(conn, f"SELECT name, result, level FROM tunnel_api.rating('{example}', 'blocks', 'example')")
     assert [(one["name"], one["result"], one["level"]) for one in ratings] == held
+    (action,) = told(0, "actions", "list", "demo")["actions"]
+    assert (action["measure"], action["cost"], action["currency"]) == ("seal the joint", 1200.0, "EUR")
+    both = told(0, "rating", "compare", example, "--elements", "blocks", "--scheme", "example", "--scheme", "example:1")
+    assert {one["difference"] for one in both["ratings"]} == {0}
+    assert [limit["name"] for limit in told(0, "alarms", "list", "demo")["limits"]] == ["chord", "growth", "oval", "wet"]
+    alarms = told(4, "alarms", "check", "demo")
+    held = rows(conn, "SELECT name, value, level FROM tunnel_api.alarms('demo')")
+    assert [(one["name"], one["value"], one["level"]) for one in alarms["alarms"]] == held
+    assert alarms["levels"]["alarm"] == sum(level == "alarm" for _, _, level in held) > 0
 
 
 LEAK = (

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import psycopg
 import pytest
+from support.cookbook_owner import add_owner
 from support.cookbook_survey import draw_findings, prepare
 from support.queue_rows import add_file, add_job, add_worker
 from support.reference import docs_script
@@ -24,7 +25,7 @@ BLOCK = re.compile(r"^```sql\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 def test_every_query_runs(conn: psycopg.Connection, example: str) -> None:
     """Each by itself, on the example survey with edits and a batch under way; one that selects must find something there."""
     prepare(conn, example)
-    draw_findings(conn, example)
+    add_owner(conn, example, draw_findings(conn, example))
     add_job(conn, example, 12, "axis", add_worker(conn, "calc-1", 4711))
     add_file(conn, example, "km-13.laz", 13)
     conn.commit()

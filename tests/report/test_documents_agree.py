@@ -18,6 +18,7 @@ from xml.etree import ElementTree
 
 import ezdxf
 import numpy as np
+import openpyxl
 import psycopg
 import pyogrio
 import pyogrio.raw
@@ -118,8 +119,27 @@ def documents(server_dsn: str, template: str) -> Iterator[str]:
         with connect(dsn) as conn:
             for case in CASES.values():
                 make_survey(conn, case.scene)
+            add_elements(conn)
         yield dsn
         admin.execute(sql.SQL("DROP DATABASE {} WITH (FORCE)").format(name))
+
+
+def add_elements(conn: psycopg.Connection) -> None:
+    """Elements of 10 m in each tunnel, and a scheme that rates them by the share of wet lining and the largest leak."""
+    conn.execute(
+        "WITH d AS (INSERT INTO tunnel.element_set (tunnel_id, name, source) SELECT id, 'tens', 'length' FROM tunnel.tunnel"
+        " RETURNING id) INSERT INTO tunnel.element (element_set_id, number, name, chainage_from, chainage_to)"
+        " SELECT d.id, n, '<' || n || '>', %s + 10 * n, %s + 10 * n FROM d, generate_series(1, 12) AS n",
+        [FIRST - 10, FIRST],
+    )
+    conn.execute(
+        "WITH s AS (INSERT INTO tunnel.rating_scheme (name, version, source, valid_from, results, min_inspected)"
+        " VALUES ('agreed', '7', 'of the tests', '2024-01-01', '{good,fair,poor}', 0.85) RETURNING id)"
+        " INSERT INTO tunnel.rating_rule (scheme_id, number, text, kinds, measure, inclusive, limits, results)"
+        " SELECT s.id, r.* FROM s, (VALUES"
+        " (1, 'wet share', '{}'::text[], 'share', false, '{0.001}'::float8[], '{fair}'::text[]),"
+        " (2, 'largest', '{leak}', 'largest_area', true, '{1}', '{poor}')) AS r"
+    )
 
 
 @pytest.fixture(params=list(CASES))
@@ -290,6 +310,81 @@ def test_words_of_the_pdf(documents: str, name: str, tmp_path: Path, chromium: P
         assert not re.search(r"(?<!\d)0 leaks", words)
         assert "there are no numbers" in words
         assert "0.0 %" not in words
+
+
+def rating_of(dsn: str, case: Case) -> list[tuple[Any, ...]]:
+    """Name, result, whether it is a lower bound, inspected share, value and finding of each element, by SQL."""
+    with connect(dsn) as conn:
+        return conn.execute(
+            "SELECT name, result, result IS NOT NULL AND NOT complete, inspected_share, value, finding_id, chainage_from,"
+            " chainage_to FROM tunnel_api.rating(%s, 'tens', 'agreed')", [case.scene.name],
+        ).fetchall()  # fmt: skip
+
+
+def shown_result(row: tuple[Any, ...]) -> str:
+    return "not rated" if row[1] is None else f"at least {row[1]}" if row[2] else row[1]
+
+
+RATED = 'headline = "rating"\n[rating]\nscheme = "agreed"\nelements = "tens"\n'
+
+
+def test_ratings(documents: str, case: Case, tmp_path: Path) -> None:
+    """The same results, values and findings in the report, a workbook, a table and SQL."""
+    known = rating_of(documents, case)
+    inside = [row for row in known if row[7] > case.low and row[6] < case.high]
+    (tmp_path / "owner.toml").write_text(RATED, "utf-8")
+    run(documents, "report", case.scene.name, "-o", tmp_path / "r.html", "--template", tmp_path / "owner.toml")
+    text = (tmp_path / "r.html").read_text("utf-8")
+    chapter = text.partition('<section id="rating">')[2].partition("</section>")[0]
+    lines = re.findall(r"<tr><td>(&lt;.*?)</tr>", chapter)
+    cells = [[html.unescape(re.sub("<[^>]*>", "", cell)) for cell in line.split("</td>")[:-1]] for line in lines]
+    assert [row[0] for row in cells] == [row[0] for row in inside]
+    assert [row[2] for row in cells] == [shown_result(row) for row in inside]
+    assert [row[8] for row in cells] == ["–" if row[5] is None else str(row[5]) for row in inside]
+    counts = dict(re.findall(r'<b class="chip rated"[^>]*>(\w+)</b></td><td class="n">(\d+)</td></tr>', chapter))
+    if case.searched:
+        assert counts == {result: str(sum(row[1] == result for row in inside)) for result in ("good", "fair", "poor")}
+    lead = re.findall(r'<p class="lead">(.*?)</p>', text)
+    unknown = any(row[1] is None or row[2] for row in inside)
+    assert lead == (
+        [f"Worst result by agreed 7: {'at least ' if unknown else ''}poor"] if case.searched
+        else ["No result by agreed 7: nothing was inspected."]
+    )  # fmt: skip
+    if any(row[1] is None for row in inside):
+        assert text.index("Not rated, because nothing was inspected:") < text.index('<dl class="figures">'), "before any figure"
+    rating = ("--elements", "tens", "--scheme", "agreed")
+    told = json.loads(run(documents, "rating", "apply", case.scene.name, *rating, "-o", tmp_path / "r.xlsx", "--json").stdout)
+    assert [row["result"] for row in told["ratings"]] == [row[1] for row in known]
+    book = openpyxl.load_workbook(tmp_path / "r.xlsx")
+    head, *rows = book["Rating"].iter_rows(values_only=True)
+    found = [dict(zip(head, row, strict=True)) for row in rows]
+    assert [row["Element"] for row in found] == [row[0] for row in known]
+    assert [row["Result"] for row in found] == [row[1] or "not rated" for row in known]
+    assert [row["Lower bound"] for row in found] == [row[2] for row in known]
+    assert [row["Finding No."] for row in found] == [row[5] for row in known]
+    for name, place in (("Inspected", 3), ("Value", 4)):
+        assert [row[name] for row in found] == [
+            row[place] if row[place] is None else pytest.approx(row[place]) for row in known
+        ]
+    assert book["Scheme"]["B5"].value == "7"
+    with connect(documents) as conn:
+        wet = conn.execute(
+            "SELECT name, wet_area FROM tunnel_api.element_findings(%s, 'tens') ORDER BY number", [case.scene.name]
+        ).fetchall()
+    assert [(row[1], row[6]) for row in book["Elements"].iter_rows(min_row=2, values_only=True)] == [
+        (name, pytest.approx(area)) for name, area in wet
+    ]
+
+
+@pytest.mark.parametrize("name", ["whole", "never"])
+def test_ratings_of_the_pdf(documents: str, name: str, tmp_path: Path, chromium: Path) -> None:
+    case = CASES[name]
+    (tmp_path / "owner.toml").write_text(RATED + 'version = "7"', "utf-8")
+    run(documents, "report", name, "-o", tmp_path / "r.pdf", "--template", tmp_path / "owner.toml")
+    words = " ".join(" ".join(page.extract_text() for page in pypdf.PdfReader(tmp_path / "r.pdf").pages).split())
+    for row in rating_of(documents, case):
+        line = rf"{row[0]} 0?\+?\S+ {shown_result(row)}"
+        assert re.search(line, words), line
 
 
 def test_sheets(documents: str, case: Case) -> None:

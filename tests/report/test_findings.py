@@ -401,6 +401,10 @@ def test_settings_written_by_windows_are_read(tmp_path: Path) -> None:
     assert read_owner(path).client == "Straßen"
 
 
+RATED = '[[rating]]\nscheme = "a"\nelements = "b"\n'
+"""A rating of a template."""
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -416,9 +420,21 @@ def test_settings_written_by_windows_are_read(tmp_path: Path) -> None:
         ('[headings]\n"{count} leaks" = "{count}"', "must be a list of 2 texts, the plural forms by 'n != 1', not '{count}'"),
         ('language = "sl"\n[headings]\n"{count} leaks" = ["a", "b"]', "must be a list of 4 texts, the plural forms by"),
         ('[headings]\n"{count} leaks" = ["{count}", 2]', "must be a text, not 2"),
-        ('scheme = "RVS 13.03"', "scheme: tunneldb does not rate by 'RVS 13.03'; leave it out, or choose GB 50108-2008"),
+        ('waterproofing = "RVS 13.03"', "waterproofing: there are no classes of 'RVS 13.03'; leave it out, or"),
+        ('headline = "class"', "headline: 'class' is none of facts, rating, waterproofing, none"),
+        ('headline = "rating"', "headline: 'rating' needs a table [rating] with scheme and elements"),
+        ('headline = "waterproofing"', "headline: 'waterproofing' needs a standard: waterproofing = \"GB 50108-2008\""),
+        ('headline_text = "{result}"', 'headline_text: needs headline = "rating"'),
+        (f'headline = "rating"\nheadline_text = "Note"\n{RATED}', "headline_text: 'Note' must contain {result}"),
+        (f'headline = "rating"\nheadline_text = "{{result}} {{x}}"\n{RATED}', "no other braces than {result}, {scheme}"),
+        ("rating = 5", "rating: must be a table [rating] or several [[rating]], not 5"),
+        ('[rating]\nelements = "rings"', "rating 1, scheme: is missing: the name of a scheme (tunneldb rating list)"),
+        (f'{RATED}[[rating]]\nscheme = "a"', "rating 2, elements: is missing: the name of a division of the tunnel"),
+        ('[rating]\nscheme = "a"\nset = "b"', "rating 1, set: unknown key; known are rating 1, scheme, rating 1, version"),
+        ('[rating]\nscheme = "a"\nversion = 2026', "rating 1, version: must be a text, not 2026"),
+        ('chapters = ["rating"]', "chapters: 'rating' needs a table [rating] with scheme and elements"),
         ('standard = "Ril 853"', "standard: unknown key"),
-        ('chapters = ["classes"]', "chapters: 'classes' needs a rating scheme: scheme = \"GB 50108-2008\""),
+        ('chapters = ["classes"]', "chapters: 'classes' needs a standard: waterproofing = \"GB 50108-2008\""),
         ('[headings]\n"Leaks" = "{"', "has other names in braces"),
         ('[severity_colours]\n5 = "#123456"', "severity_colours.5: severities are 1 to 4"),
         ('[severity_colours]\n1 = "red"', "severity_colours.1: must be a colour such as #b8371d, not 'red'"),
@@ -444,7 +460,7 @@ def test_a_template_that_is_not_there_is_one_line(tmp_path: Path) -> None:
 
 def test_examples_of_templates_and_a_language_of_ones_own(tmp_path: Path) -> None:
     examples = sorted((Path(__file__).parents[2] / "docs" / "examples").glob("owner-*.toml"))
-    assert len(examples) == 2
+    assert len(examples) == 3
     for path in examples:
         assert read_owner(path) != Owner()
     (tmp_path / "fr.toml").write_text('date = "%d/%m/%Y"\n[texts]\n"Leaks" = "Fuites"\n', "utf-8")
@@ -522,7 +538,7 @@ def example_catalogue() -> frozenset[str]:
     baseline = (Path(__file__).parents[2] / "migrations" / "baseline" / "finding.sql").read_text("utf-8")
     texts |= set(re.findall(r"^    \('\w+', '([^']+)', '{", baseline, re.MULTILINE))
     texts |= set(re.findall(r"^    \(\d, '(\w+)',", baseline, re.MULTILINE))
-    for path in [*(package / "templates").rglob("*.*"), package / "strip.py"]:
+    for path in [*(package / "templates").rglob("*.*"), package / "strip.py", package / "rating.py"]:
         text = path.read_text("utf-8")
         texts |= set(re.findall(r'(?<![\w.])(?:_|self\.words|words)(?:\.count)?\(\s*"([^"]+)"', text))
         if path.suffix == ".js":

@@ -190,7 +190,11 @@ def test_without_a_scheme_facts_are_the_headline(reading: Reading, leaks: list[d
 @pytest.mark.parametrize("language", ["en", "de", "sl"])
 def test_class_is_the_databases_where_the_template_asks_for_it(shared: str, tmp_path: Path, language: str) -> None:
     template = tmp_path / "owner.toml"
-    template.write_text(f'language = "{language}"\nscheme = "GB 50108-2008"\nchapters = ["summary", "classes"]', "utf-8")
+    template.write_text(
+        f'language = "{language}"\nwaterproofing = "GB 50108-2008"\nheadline = "waterproofing"\n'
+        'chapters = ["summary", "classes"]',
+        "utf-8",
+    )
     run("--dsn", shared, "report", SURVEY, "-o", tmp_path / "r.html", "--template", template)
     text = (tmp_path / "r.html").read_text("utf-8")
     with connect(shared) as conn:

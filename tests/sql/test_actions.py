@@ -83,6 +83,7 @@ def test_overdue_is_what_is_not_done_after_its_day(conn: psycopg.Connection, exa
         ({"currency": "EUR"}, "a cost needs its currency"),
         ({"finding_id": 999_999}, "has no finding 999999"),
         ({"chainage_from": 12330}, "chainage_to that is not less"),
+        ({"chainage_from": 12290}, "from chainage 12290 to 12320 is not within the survey"),
         ({"chainage_from": None}, "needs a finding, or chainage_from"),
         ({"survey": "nothing"}, "there is none named nothing"),
     ],
@@ -105,7 +106,7 @@ def test_edits_are_in_the_audit(conn: psycopg.Connection, leak: dict[str, Any]) 
     assert rows[1]["before"] == {"state": "open"}
     assert rows[1]["after"] == {"state": "ordered", "responsible": "Works Ltd"}
     assert rows[3]["before"]["state"] == "done"
-    assert not ask(conn, "SELECT 1 FROM tunnel_api.action")
+    assert not ask(conn, "SELECT 1 FROM tunnel_api.action WHERE id = %s", [key])
 
 
 def test_an_action_outlives_its_drawn_finding(conn: psycopg.Connection, example: str) -> None:

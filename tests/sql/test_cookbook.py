@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -17,8 +18,10 @@ from psycopg import sql
 from psycopg.conninfo import make_conninfo
 from psycopg.rows import dict_row
 from support import cookbook_network as network
+from support import cookbook_owner as owner
 from support import example_change
 from support.cookbook_survey import CONFIRMED, GONE, MOVED, NICHE, OLD, POINTS, SPARSE, draw_findings, prepare
+from support.example_alarm import OVALITY as OVAL_LIMITS
 from support.example_clearance import TIGHT
 from support.example_deviation import BULGE, OVER, THICK, THIN, THIN_PLACE, UNDER, UNEVEN
 from support.example_objects import FLOOR, HALF_FLOOR, SPHERES, THINGS, beside
@@ -33,6 +36,8 @@ QUESTION = re.compile(r"^### (.+?)$(?:(?!^#).)*?^```sql\n(.*?)^```$", re.MULTILI
 QUESTIONS = dict(QUESTION.findall(PAGE.read_text("utf-8")))
 OF_FINDINGS = dict(QUESTION.findall(PAGE.read_text("utf-8").partition("\n## Findings\n")[2]))
 """Those that are asked after findings were drawn."""
+OF_OWNERS = dict(QUESTION.findall(PAGE.read_text("utf-8").partition("\n## Ratings, actions and alarms\n")[2]))
+"""Those of them that are asked after a later inspection, with actions."""
 
 PLACE = (12345.0, 2.0, 0.1)
 """Chainage, arc and offset of the point that is asked about in place of the page's, m."""
@@ -82,6 +87,7 @@ class Asked:
     anomalies: list[Leak]
     who: str
     drawn: dict[str, int]
+    actions: dict[str, int]
 
     @property
     def leaks(self) -> list[Leak]:
@@ -117,18 +123,25 @@ def asked(server_dsn: str, example_template: str) -> Iterator[Asked]:
         anomalies = [Leak(*row[:6], *(shapely.from_wkb(bytes(wkb)) for wkb in row[6:])) for row in rows]
         drawn = draw_findings(conn, NAME)
         conn.commit()
-        answers |= {title: put(conn, query) for title, query in OF_FINDINGS.items()}
-        yield Asked(answers, anomalies, conn.execute(WHO).fetchone()[0], drawn)
+        answers |= {title: put(conn, query) for title, query in OF_FINDINGS.items() if title not in OF_OWNERS}
+        actions = owner.add_owner(conn, NAME, drawn)
+        conn.commit()
+        answers |= {title: put(conn, query) for title, query in OF_OWNERS.items()}
+        yield Asked(answers, anomalies, conn.execute(WHO).fetchone()[0], drawn, actions)
     with psycopg.connect(server_dsn, autocommit=True) as admin:
         admin.execute(sql.SQL("DROP DATABASE {} WITH (FORCE)").format(sql.Identifier(database)))
 
 
 def put(conn: psycopg.Connection, query: str) -> Rows:
-    """The rows of an answer; a point written out is taken to PLACE."""
+    """The rows of an answer, of several statements the last one's; a point written out is taken to PLACE."""
     x, y, z = SURFACE.to_space(*(np.array([value]) for value in PLACE))[0].tolist()
     query = re.sub(r"ST_MakePoint\([\d.]+, [\d.]+, [\d.]+\)", f"ST_MakePoint({x}, {y}, {z})", query)
+    rows: Rows = []
     with conn.cursor(row_factory=dict_row) as cursor:
-        return cursor.execute(query.encode()).fetchall()
+        cursor.execute(query.encode())
+        for result in cursor.results():
+            rows = result.fetchall() if result.description else rows
+    return rows
 
 
 def ids(rows: Rows) -> list[int]:
@@ -683,6 +696,101 @@ def not_seen(rows: Rows, a: Asked) -> None:
     close(row, 1, unseen_m2=example_change.GIRTH * (example_change.UNSEEN[1] - example_change.UNSEEN[0]))
 
 
+BLOCK = 50 * GIRTH
+"""Lining of an element of the division ``blocks``, m²; of block 1 a fifth was not inspected."""
+
+
+def results(rows: Rows, a: Asked) -> None:
+    """Block 1 and 3 have more than 0.2 % wet lining, block 2 a crack of severity 4, block 4 0.05 % to 0.2 %."""
+    assert [(row["result"], row["elements"], row["lower_bounds"]) for row in rows] == [("D", 1, 0), ("C", 2, 1), ("B", 1, 0)]
+
+
+def too_little(rows: Rows, a: Asked) -> None:
+    (row,) = rows
+    assert (row["name"], row["at_least"], row["remark"]) == ("block 1", "C", "80 % inspected")
+    close(row, 0, inspected_percent=100 * (12350 - SEEN_FROM) / 50)
+
+
+def rated_worse(rows: Rows, a: Asked) -> None:
+    """Block 4: its leak has become larger. Block 2 became better, and the others are as they were."""
+    (row,) = rows
+    assert (row["name"], row["earlier_survey"], row["earlier_result"], row["result"]) == ("block 4", NAME, "B", "C")
+    assert (row["change"], row["known"]) == (1, True)
+    (leak,) = [leak for leak in a.wet if leak.low > owner.WETTER_FROM]
+    text, value = row["why"].removesuffix(" > 0.002").split(": ")
+    assert text == "share of wet lining"
+    assert float(value) == pytest.approx(owner.WETTER * leak.area / BLOCK, abs=1e-4)
+
+
+def schemes(rows: Rows, a: Asked) -> None:
+    """The first has four results, the second two: C is 2/3 of the way to the worst, and bad is the worst."""
+    assert [(row["name"], row["result"], row["other_result"]) for row in rows] == [
+        ("block 2", "D", "good"), ("block 1", "C", "good"), ("block 3", "C", "bad"), ("block 4", "B", "good"),
+    ]  # fmt: skip
+    for row, difference in zip(rows, (-1, -2 / 3, 1 / 3, -1 / 3), strict=True):
+        close(row, difference=difference)
+    assert rows[0]["why"] == "severity: 4 ≥ 4"
+    assert rows[2]["other_why"].startswith("number of leaks: 3 > 1")
+
+
+def rating_then(rows: Rows, a: Asked) -> None:
+    """Before the reviews and drawings: block 2 had no crack, and block 1 another leak."""
+    assert [(row["name"], row["result"], row["complete"]) for row in rows] == [
+        ("block 1", "C", False), ("block 2", "A", True), ("block 3", "C", True), ("block 4", "B", True),
+    ]  # fmt: skip
+    wet = sum(leak.area for leak in a.leaks if leak.high < 12350)
+    share = float(rows[0]["why"].removeprefix("share of wet lining: ").removesuffix(" > 0.002"))
+    assert share == pytest.approx(wet / (BLOCK - GIRTH * (SEEN_FROM - 12300)), abs=1e-4)
+
+
+def overdue(rows: Rows, a: Asked) -> None:
+    (row,) = rows
+    assert (row["id"], row["measure"], row["responsible"], row["state"]) == (a.actions["late"], "inject", "Works Ltd", "open")
+    assert row["days"] == (dt.date.today() - dt.date(2025, 3, 31)).days
+
+
+def costs(rows: Rows, a: Asked) -> None:
+    assert [(row["urgency"], row["currency"], row["actions"], row["cost"]) for row in rows] == [
+        ("immediate", None, 1, None), ("urgent", "EUR", 2, 1300), ("planned", "EUR", 1, 1200)
+    ]  # fmt: skip
+
+
+def not_dry(rows: Rows, a: Asked) -> None:
+    before, after = example_change.LEAKS["same"]
+    assert [(row["id"], row["follow_up"]) for row in rows] == [
+        (a.actions["still wet"], f"same on 2026-05-04: {before:.2f} to {after:.2f} m²"),
+        (a.actions["not compared"], "not compared"),
+    ]
+
+
+def without_action(rows: Rows, a: Asked) -> None:
+    """The longer crack has one; of both spalls the merged one is left."""
+    assert [(row["id"], row["severity"]) for row in rows[:2]] == [(a.drawn["short crack"], 4), (a.drawn["bolt"], 3)]
+    assert [(row["kind_label"], row["severity"]) for row in rows[2:]] == [("Spall", 3)]
+
+
+def actions_changed(rows: Rows, a: Asked) -> None:
+    assert [(row["action"], row["id"]) for row in rows] == [
+        ("update", a.actions["drain"]),
+        *(("insert", key) for name, key in reversed(a.actions.items()) if name != "seal"),
+    ]
+    assert {row["who"] for row in rows} == {a.who}
+    assert rows[0]["before"] == {"state": "open"}
+    assert rows[0]["after"] == {"state": "ordered", "responsible": "Drains Ltd"}
+
+
+def exceeded(rows: Rows, a: Asked) -> None:
+    oval = [example_change.OVALER * OVALITY * number for number in range(1, COUNT + 1)]
+    found = {(row["name"], row["level"]): row for row in rows}
+    warning, alarm = OVAL_LIMITS
+    assert found["oval", "alarm"]["places"] == sum(one >= alarm for one in oval)
+    assert found["oval", "warning"]["places"] == sum(warning <= one < alarm for one in oval)
+    close(found["oval", "alarm"], 4, greatest=max(oval))
+    wet = found["wet", "alarm"]
+    assert (wet["places"], wet["chainage_from"], wet["chainage_to"]) == (3, 12300, 12500)
+    assert [row["level"] for row in rows] == sorted((row["level"] for row in rows), key=["alarm", "warning", "unknown"].index)
+
+
 CHECKS: dict[str, Callable[[Rows, Asked], None]] = {
     "Which leaks over 0.2 m² are there between two chainages, and on which segment?": over,
     "Which drip from above?": above,
@@ -758,6 +866,17 @@ CHECKS: dict[str, Callable[[Rows, Asked], None]] = {
     "Which leaks do dry regions exclude?": dry_regions,
     "How much of each element is in which condition?": conditions,
     "What was the outline of a finding before it was redrawn?": before_redrawn,
+    "How many elements have each result?": results,
+    "Of which elements was too little inspected for a result?": too_little,
+    "Which elements were rated worse than in the last inspection, and why?": rated_worse,
+    "Where do two schemes differ, and why?": schemes,
+    "What was the rating on a date?": rating_then,
+    "Which actions are overdue, and who is responsible?": overdue,
+    "What do the open actions cost, by urgency and currency?": costs,
+    "Which leaks are not known to be dry although their action is done?": not_dry,
+    "Which severe findings have no action?": without_action,
+    "Which actions were added or changed since a date, and by whom?": actions_changed,
+    "Which limits does the latest survey exceed, and what is unknown?": exceeded,
 }
 
 

@@ -13,6 +13,8 @@ from psycopg.conninfo import make_conninfo
 from shapely.geometry import Polygon, box
 
 from support.databases import create_database
+from support.example_action import add_action
+from support.example_alarm import add_alarms
 from support.example_clearance import add_clearance
 from support.example_deviation import add_deviation
 from support.example_objects import CORNER, HALF_FLOOR, SPHERES, THINGS, beside, boxed, relief
@@ -110,7 +112,12 @@ def add_later_survey(conn: psycopg.Connection, name: str = "demo-2026") -> None:
         "WHERE name = %s RETURNING id",
         (name, NAME),
     ).fetchone()
-    for table in ("axis_vertex", "segment", "section", "coverage", "image"):
+    copy_rows(conn, NAME, later, ("axis_vertex", "segment", "section", "coverage", "image"))
+
+
+def copy_rows(conn: psycopg.Connection, source: str, target: int, tables: tuple[str, ...]) -> None:
+    """Copy the rows of tables from a survey to another one, without their keys."""
+    for table in tables:
         columns = [
             column
             for (column,) in conn.execute(
@@ -121,9 +128,10 @@ def add_later_survey(conn: psycopg.Connection, name: str = "demo-2026") -> None:
         ]
         names = sql.SQL(", ").join(map(sql.Identifier, columns))
         conn.execute(
-            sql.SQL("INSERT INTO tunnel.{} (survey_id, {}) SELECT {}, {} FROM tunnel.{}").format(
-                sql.Identifier(table), names, sql.Literal(later), names, sql.Identifier(table)
-            )
+            sql.SQL(
+                "INSERT INTO tunnel.{table} (survey_id, {names}) SELECT {target}, {names} FROM tunnel.{table}"
+                " WHERE survey_id = (SELECT id FROM tunnel.survey WHERE name = {source})"
+            ).format(table=sql.Identifier(table), names=names, target=sql.Literal(target), source=sql.Literal(source))
         )
 
 
@@ -159,6 +167,8 @@ def _fill(conn: psycopg.Connection) -> None:
     add_deviation(conn, survey_id)
     add_clearance(conn, survey_id)
     add_rating(conn, survey_id)
+    add_action(conn, survey_id)
+    add_alarms(conn, survey_id)
     add_rings(conn, survey_id)
     conn.execute(  # through the view, so that the audit has a row
         "INSERT INTO tunnel_api.region (survey_id, kind, geom) VALUES (%s, 'dry', ST_MakeEnvelope(12410, -3, 12414, 0, 0))",

@@ -96,7 +96,7 @@ def actions() -> None:
 @click.option("--overdue", is_flag=True, help="Only actions that are open or ordered after their due date.")
 @click.pass_obj
 def list_(settings: Settings, tunnel: str, survey: str | None, states: tuple[str, ...], overdue: bool) -> None:
-    """List the actions of TUNNEL by due date, with what became of each leak in later surveys.
+    """List the actions of TUNNEL by due date, with the state of each leak in later surveys.
 
     A later survey is included if it was compared with the survey of the action (tunneldb compare).
     """

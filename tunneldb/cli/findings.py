@@ -92,6 +92,8 @@ def findings() -> None:
     help="Default: by the ending of -o, otherwise a table.",
 )
 @click.option("-o", "--output", type=FilePath(dir_okay=False), help="File to write.")
+@click.option("--scheme", metavar="NAME", help="Rating scheme, the version added last; with --elements, for a workbook.")
+@click.option("--elements", "element_set", metavar="NAME", help="Division of the tunnel to rate (tunneldb elements).")
 @click.option("--count", is_flag=True, help="Number of each kind and origin instead, by state.")
 @click.pass_context
 def list_findings(
@@ -108,6 +110,8 @@ def list_findings(
     geometry: str,
     form: str | None,
     output: Path | None,
+    scheme: str | None,
+    element_set: str | None,
     count: bool,
 ) -> None:
     """List the findings of SURVEY, detected and drawn, or write them to a file.
@@ -118,7 +122,7 @@ def list_findings(
     As for leaks, stretches where leaks could be missed, notes and limitations come first, in every file too.
 
     An Excel workbook has sheets of the listed findings, of counts, of findings that fit except for their state, and
-    of dry regions. --json has the counts too, of any state.
+    of dry regions; with --scheme and --elements also of the rated elements. --json has the counts too, of any state.
 
     The word list is optional: tunneldb findings SURVEY.
     """
@@ -134,10 +138,13 @@ def list_findings(
                 "--geometry": geometry != "unrolled",
                 "--format": form not in (None, "table"),
                 "-o": output is not None,
+                "--scheme": scheme is not None,
             }
         )
     settings: Settings = context.obj
     form = table_format(form, output, "findings", ("csv", "geojson", "gpkg", "xlsx"))
+    if (scheme is None) != (element_set is None) or (scheme is not None and form != "xlsx"):
+        raise UserError("--scheme and --elements go together, and need a workbook: -o findings.xlsx")
     hours = parse_clock(clock) if clock else None
     with connect(settings.dsn) as conn:
         found = get_survey(conn, survey)
@@ -156,6 +163,11 @@ def list_findings(
         fitting = read_findings(conn, found, cast(Geometry, geometry), chosen)
         severities, regions = read_severities(conn), read_dry_regions(conn, found, stretch.low, stretch.high)
         counts, wet = count_findings(fitting, read_kinds(conn)), read_wet_kinds(conn)
+        rated = []
+        if scheme is not None and element_set is not None:
+            from tunneldb.export.tables.rating import rating_sheets
+
+            rated = rating_sheets(conn, found.name, element_set, scheme, None, stretch.low, stretch.high)
     rows = [row for row in fitting if not wanted or row.state in wanted]
     add_to_json(survey=survey, listed=len(rows), geometry=geometry, findings=rows, kinds=counts, dry_regions=regions)
     listed = FindingList(rows, coverage, remarks)
@@ -168,7 +180,7 @@ def list_findings(
                 write_gpkg(temporary, listed, cast(Geometry, geometry), found.srid)
             elif form == "xlsx":
                 others = [row for row in fitting if wanted and row.state not in wanted]
-                write_findings(temporary, found.name, listed, others, sum_groups(counts, wet), severities, regions)
+                write_findings(temporary, found.name, listed, others, sum_groups(counts, wet), severities, regions, rated)
             elif form == "geojson":
                 temporary.write_text(as_geojson(listed, cast(Geometry, geometry), found.srid), encoding="utf-8")
             else:

@@ -77,6 +77,7 @@ GROUPS: dict[str, dict[str, tuple[str, str]]] = {
         "actions": ("tunneldb.cli.actions:actions", "List, add, change, write or read the actions that inspections demand."),
         "elements": ("tunneldb.cli.elements:elements", "Add, list or remove the elements of a tunnel that are rated."),
         "rating": ("tunneldb.cli.rating:rating", "Rate the elements of a survey by an owner's scheme."),
+        "alarms": ("tunneldb.cli.alarms:alarms", "Check ovality, convergence and wet area of a tunnel against limits."),
         "evaluate": ("tunneldb.cli.evaluate:evaluate", "Compare detected leaks with reference leaks."),
         "intensity": (
             "tunneldb.cli.intensity:intensity",
@@ -133,6 +134,7 @@ MANUAL: dict[str, list[tuple[str, str]]] = {
         ("0", DONE),
         ("1", "some commands: done, with problems; see their help"),
         ("2", AT_FAULT),
+        ("3, 4, 5", "of alarms check: a warning, an alarm, or something not judged"),
     ],
     "Environment": [
         ("TUNNELDB_DSN", "database to use, as --dsn"),

@@ -119,12 +119,22 @@ class Command(click.Command):
         Command lines to copy.
     wrong : str
         What exit code 1 means; empty when the command does not have it.
+    codes : mapping of str to str, optional
+        Meanings of further exit codes, or of code 0.
     """
 
-    def __init__(self, *arguments: Any, examples: Sequence[str] = (), wrong: str = "", **options: Any) -> None:
+    def __init__(
+        self,
+        *arguments: Any,
+        examples: Sequence[str] = (),
+        wrong: str = "",
+        codes: Mapping[str, str] | None = None,
+        **options: Any,
+    ) -> None:
         super().__init__(*arguments, **options)
         self.examples = tuple(examples)
         self.wrong = wrong
+        self.codes = dict(codes or {})
         help_ = "Print one JSON object with results, counts and seconds; also after an error."
         self.params.append(click.Option([JSON], is_flag=True, expose_value=False, help=help_))
 
@@ -137,7 +147,7 @@ class Command(click.Command):
         """Write what the command appends, then examples and exit codes."""
         super().format_epilog(ctx, formatter)
         write_lines(formatter, "Examples", self.examples)
-        codes = {"0": DONE, "1": self.wrong, "2": AT_FAULT}
+        codes = {"0": DONE, "1": self.wrong, "2": AT_FAULT} | self.codes
         with formatter.section("Exit codes"):
             formatter.write_dl([(code, text) for code, text in codes.items() if text])
 

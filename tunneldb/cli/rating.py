@@ -17,6 +17,7 @@ from tunneldb.cli.tables import print_table
 from tunneldb.counted import counted
 from tunneldb.database import connect
 from tunneldb.errors import UserError
+from tunneldb.files import replacing
 
 COLUMNS = (
     "number", "name", "chainage_from", "chainage_to", "clock_from", "clock_to", "inspected_share", "findings", "result",
@@ -143,7 +144,7 @@ def remove(settings: Settings, scheme: str, version: str) -> None:
 @click.option("--elements", "element_set", required=True, metavar="NAME", help="Division of the tunnel (tunneldb elements).")
 @click.option("--scheme", required=True, metavar="NAME", help="Rating scheme.")
 @click.option("--version", metavar="VERSION", help="Version of the scheme. [default: the one added last]")
-@output_option("File to write: .csv.")
+@output_option("File to write: .csv or .xlsx.")
 @click.pass_obj
 def apply(settings: Settings, survey: str, element_set: str, scheme: str, version: str | None, output: Path | None) -> None:
     """Rate the elements of SURVEY.
@@ -151,16 +152,20 @@ def apply(settings: Settings, survey: str, element_set: str, scheme: str, versio
     The worst result of all rules is that of the element. If less than the scheme's minimum was inspected, the result
     is a lower bound, marked "at least". An element that was not inspected and has no findings has no result.
     """
+    from tunneldb.export.tables.rating import write_rating
     from tunneldb.store.rating import rate, scheme_rules
     from tunneldb.store.survey import get_survey
 
-    require_ending(output, "the rating", (".csv",))
+    require_ending(output, "the rating", (".csv", ".xlsx"))
     with connect(settings.dsn) as conn:
         get_survey(conn, survey)
         found, _ = scheme_rules(conn, scheme, version)
         rows = rate(conn, survey, element_set, found["name"], found["version"])
+        if output is not None and output.suffix.lower() == ".xlsx":
+            with replacing(output) as temporary:
+                write_rating(temporary, conn, survey, element_set, found["name"], found["version"])
     add_to_json(survey=survey, elements=element_set, scheme=found["name"], version=found["version"], ratings=rows)
-    files = [] if output is None else write_rows(output, COLUMNS, rows)
+    files = [] if output is None else [output] if output.suffix.lower() == ".xlsx" else write_rows(output, COLUMNS, rows)
     print_table(
         ["element", "inspected %", "findings", "result", "finding", "why"],
         [

@@ -52,6 +52,7 @@ _OWN = (
     ("finding", "count_truncate", "tunnel", "forget_findings"),
     ("finding_kind", "wet_of_kind", "tunnel", "wet_of_kind"),
     ("run", "set_subject", "tunnel", "set_subject"),
+    ("as_of", "refuse_past", "tunnel", "refuse_past"),
     ("waterproof", "keep", "tunnel_internal", "keep_at_commit"),
 )
 _OURS = ", ".join(str(each) for each in _OWN)

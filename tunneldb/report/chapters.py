@@ -17,7 +17,9 @@ from tunneldb.report.drawing import share_path, step_for, ticks, without_detecti
 from tunneldb.report.facts import Facts
 from tunneldb.report.location import LocationMap, draw_location
 from tunneldb.report.owner import CHAPTERS
+from tunneldb.report.rating import LISTED_WORST, UNFOLDED, Difference, differences
 from tunneldb.report.rings import read_rings
+from tunneldb.report.since import LISTED_WORSE
 from tunneldb.report.strip import LETTERS
 from tunneldb.report.underwater import read_underwater
 from tunneldb.store.catalog import crs_text
@@ -83,9 +85,10 @@ class _Found(Chapter):
 
 
 class Summary(Chapter):
-    """Main figures, facts of the survey, and the class of waterproofing if the owner's template asks for it."""
+    """Headline as the owner's template asks for it, main figures, changes since the last inspection, facts of the survey."""
 
-    name = "summary"
+    name, style = "summary", "rating.css"
+    words, listed = CHANGE_WORDS, LISTED_WORSE
 
     @cached_property
     def crs(self) -> str:
@@ -137,6 +140,23 @@ class Summary(Chapter):
         }
 
 
+class Rating(_Found):
+    """Elements of the tunnel, rated by schemes of the owner."""
+
+    name, style = "rating", "rating.css"
+    listed, unfolded = LISTED_WORST, UNFOLDED
+
+    @property
+    def found(self) -> Any:
+        """Ratings that the template asks for."""
+        return self.facts.ratings
+
+    @property
+    def differences(self) -> list[Difference]:
+        """Schemes that rate the same elements, and where they differ."""
+        return differences(self.facts.ratings)
+
+
 class Seen(_OfLeaks):
     """Inspected lining, and where leaks could be missed."""
 
@@ -146,11 +166,6 @@ class Seen(_OfLeaks):
     def unsearched(self) -> float:
         """Length of the stretch that was not searched for leaks, m."""
         return float((1 - self.facts.total["searched_share"]) * (self.facts.high - self.facts.low))
-
-    @cached_property
-    def detectability(self) -> list[data.DetectabilityShares]:
-        """Shares of the inspected lining by whether leaks of the demanded size would be found."""
-        return data.read_detectability(*self._of)
 
     @cached_property
     def ribbon(self) -> list[tuple[float, float, float, float]]:
@@ -168,14 +183,14 @@ class Seen(_OfLeaks):
 
 
 class Classes(_OfLeaks):
-    """Classes of waterproofing, by the scheme that the owner's template asks for."""
+    """Classes of waterproofing by the standard that the owner's template asks for."""
 
     name = "classes"
 
     @property
     def has_content(self) -> bool:
-        """True if leaks can be searched for, and a scheme is asked for."""
-        return super().has_content and self.facts.request.owner.scheme is not None
+        """True if leaks can be searched for, and a standard is asked for."""
+        return super().has_content and self.facts.request.owner.waterproofing is not None
 
     @cached_property
     def rows(self) -> Any:
@@ -361,7 +376,7 @@ class Reviews(Chapter):
 
     def __init__(self, facts: Facts) -> None:
         super().__init__(facts)
-        self.edits_in_all, self._edits = data.read_edits(facts.conn, facts.survey)
+        self.edits_in_all, self._edits = data.read_edits(facts.conn, facts.survey, facts.request.at)
 
     @property
     def people(self) -> Any:
@@ -385,8 +400,8 @@ class Signatures(Chapter):
 ALL: dict[str, type[Chapter]] = {
     chapter.name: chapter
     for chapter in (
-        Summary, Seen, Classes, Lining, Sections, Leaks, Statistics, Findings, Dry, Structures, Underwater, Clearance, Rings,
-        Change, Deviation, Methods, Reviews, Signatures,
+        Summary, Rating, Seen, Classes, Lining, Sections, Leaks, Statistics, Findings, Dry, Structures, Underwater, Clearance,
+        Rings, Change, Deviation, Methods, Reviews, Signatures,
     )
 }  # fmt: skip
 """All chapters by name, in their default order."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import hashlib
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,6 +19,8 @@ from tunneldb.report.leak_sums import LeakSums, sum_leaks
 from tunneldb.report.lining import Form
 from tunneldb.report.owner import Owner
 from tunneldb.report.pictures.load import Source
+from tunneldb.report.rating import Rating, digest_ratings, read_rating
+from tunneldb.report.since import Since, read_since
 from tunneldb.report.strip import Progress, Strips
 from tunneldb.report.structures import StructuresChapter, read_structures
 from tunneldb.store.coverage import Coverage
@@ -48,6 +51,10 @@ class Request:
         Format of the pictures.
     progress : callable
         Called after each strip.
+    at : datetime
+        Moment whose state is reported.
+    past : bool
+        True if that is not the present.
     """
 
     survey: Survey
@@ -60,6 +67,8 @@ class Request:
     pictures: int | None
     form: Form
     progress: Progress
+    at: dt.datetime
+    past: bool = False
 
 
 class Facts:
@@ -123,6 +132,30 @@ class Facts:
         return read_findings_chapter(self.conn, self.survey, stretch, ids, self.sums.ids, self.request.photos, table=table)
 
     @cached_property
+    def detectability(self) -> list[data.DetectabilityShares]:
+        """Shares of the inspected lining by whether leaks of the demanded size would be found."""
+        return data.read_detectability(self.conn, self.survey, self.low, self.high)
+
+    @cached_property
+    def ratings(self) -> list[Rating]:
+        """Ratings that the owner's template asks for."""
+        asked = self.request.owner.ratings
+        return [read_rating(self.conn, self.survey, self.low, self.high, n, one) for n, one in enumerate(asked, start=1)]
+
+    @cached_property
+    def since(self) -> Since | None:
+        """Comparison with the last inspection."""
+        return read_since(self.conn, self.survey, self.low, self.high, self.ratings) if self.sought else None
+
+    @cached_property
+    def linked(self) -> tuple[frozenset[int], frozenset[int]]:
+        """Ids of the leaks and of the other findings that have a place in this report."""
+        chapters = self.request.owner.chapters
+        leaks = frozenset(leak.id for leak in self.leaks) if "leaks" in chapters and self.sought else frozenset()
+        found = self.findings.listed if self.findings and "findings" in chapters else []
+        return leaks, frozenset(finding.id for finding in found)
+
+    @cached_property
     def regions(self) -> list[DryRegion]:
         """Dry regions that inspectors drew."""
         return read_dry_regions(self.conn, self.survey, self.low, self.high)
@@ -176,11 +209,12 @@ class Facts:
 
     @cached_property
     def digest(self) -> str:
-        """SHA-256 of the reported leaks: two reports of the same leaks and reviews have the same."""
+        """SHA-256 of the reported findings and ratings: two reports of the same findings and reviews have the same."""
         digest = self.sums.digest.copy()
         digest_findings(digest, self.findings, self.regions)
         if self.structures:
             digest_spots(digest, self.structures)
+        digest_ratings(digest, self.ratings)
         return digest.hexdigest()[:16]
 
     def labels(self, chainages: list[float]) -> list[str]:

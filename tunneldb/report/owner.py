@@ -1,4 +1,4 @@
-"""An owner's template of the report: a small TOML file with logo, client, language, rating scheme, chapters and colours."""
+"""An owner's template of the report: a small TOML file with logo, client, language, headline, ratings, chapters, colours."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from tunneldb.tomlfile import read_toml
 
 CHAPTERS = {
     "summary": "Summary",
+    "rating": "Rating",
     "seen": "Inspected lining",
     "classes": "Waterproofing",
     "lining": "Lining",
@@ -36,12 +37,37 @@ CHAPTERS = {
 }
 """Chapters in their default order: names, and titles in the navigation."""
 
-SCHEMES = ("GB 50108-2008",)
-"""Rating schemes whose rules the program applies: the only standards that a report names."""
+STANDARDS = ("GB 50108-2008",)
+"""Standards of waterproofing whose classes the program computes: the only ones that a report names by itself."""
+
+HEADLINES = ("facts", "rating", "waterproofing", "none")
+"""Headlines: leaks, wet area, inspected share and what could be found; worst result of a rating; class of waterproofing."""
+
+HEADLINE_NAMES = ("{result}", "{scheme}", "{version}")
+"""Names in braces of the owner's text of the headline."""
 
 _COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
 _NAME = re.compile(r"\{\w+\}")
 _DAY_CODE = re.compile(r"%(?:-?[dejmUuVWwGgyY]|[aAbBCDFhx%])")
+
+
+@dataclass(frozen=True)
+class RatingRequest:
+    """Rating that a report states.
+
+    Attributes
+    ----------
+    scheme : str
+        Name of the scheme.
+    version : str or None
+        Its version; None for the one added last.
+    elements : str
+        Name of the division of the tunnel into elements.
+    """
+
+    scheme: str
+    version: str | None
+    elements: str
 
 
 @dataclass(frozen=True)
@@ -54,8 +80,14 @@ class Owner:
         The language of its headings.
     client, project : str or None
         Client and project.
-    scheme : str or None
-        Rating scheme of SCHEMES, whose class is the headline of the report; None for a report without a class.
+    headline : str
+        One of HEADLINES.
+    headline_text : str or None
+        Text of the headline of a rating, with HEADLINE_NAMES; None for the program's.
+    ratings : tuple of RatingRequest
+        Ratings by the owner's schemes; the first is that of the headline.
+    waterproofing : str or None
+        Standard of STANDARDS whose classes are stated; None for a report without a class.
     logo : str or None
         The owner's, as a data URL.
     chapters : tuple of str
@@ -67,13 +99,20 @@ class Owner:
     words: Words = field(default_factory=Words)
     client: str | None = None
     project: str | None = None
-    scheme: str | None = None
+    headline: str = HEADLINES[0]
+    headline_text: str | None = None
+    ratings: tuple[RatingRequest, ...] = ()
+    waterproofing: str | None = None
     logo: str | None = None
     chapters: tuple[str, ...] = tuple(CHAPTERS)
     colours: Mapping[int, str] = field(default_factory=lambda: SEVERITY_COLOURS)
 
 
-_KEYS = ("logo", "client", "project", "scheme", "language", "chapters", "headings", "severity_colours")
+_KEYS = (
+    "logo", "client", "project", "headline", "headline_text", "rating", "waterproofing", "language", "chapters", "headings",
+    "severity_colours",
+)  # fmt: skip
+_RATING_KEYS = ("scheme", "version", "elements")
 
 
 def read_owner(path: Path) -> Owner:
@@ -86,14 +125,18 @@ def read_owner(path: Path) -> Owner:
     """
     given = _Given(path, read_toml(path, "a template"))
     given.refuse_others(_KEYS)
-    logo, scheme = given.text("logo"), _scheme(given)
+    logo, waterproofing, ratings = given.text("logo"), _waterproofing(given), _ratings(given)
+    headline = _headline(given, ratings, waterproofing)
     return Owner(
         words=_words(given),
         client=given.text("client"),
         project=given.text("project"),
-        scheme=scheme,
+        headline=headline,
+        headline_text=_headline_text(given, headline),
+        ratings=ratings,
+        waterproofing=waterproofing,
         logo=None if logo is None else _logo(given, path.parent / logo),
-        chapters=_chapters(given, scheme),
+        chapters=_chapters(given, ratings, waterproofing),
         colours=_colours(given),
     )
 
@@ -184,14 +227,63 @@ def _words(given: _Given) -> Words:
     return Words(code, texts | given.texts("headings", plural), date, plural)
 
 
-def _scheme(given: _Given) -> str | None:
-    scheme = given.text("scheme")
-    if scheme is not None and scheme not in SCHEMES:
-        given.refuse("scheme", f"tunneldb does not rate by {scheme!r}; leave it out, or choose {' or '.join(SCHEMES)}")
-    return scheme
+def _waterproofing(given: _Given) -> str | None:
+    standard = given.text("waterproofing")
+    if standard is not None and standard not in STANDARDS:
+        given.refuse(
+            "waterproofing",
+            f"there are no classes of {standard!r}; leave it out, or choose {' or '.join(STANDARDS)}; for limits of your own"
+            " write [[rating]]",
+        )
+    return standard
 
 
-def _chapters(given: _Given, scheme: str | None) -> tuple[str, ...]:
+def _ratings(given: _Given) -> tuple[RatingRequest, ...]:
+    """Return the ratings: a table ``[rating]``, or several ``[[rating]]``."""
+    tables = given.values.get("rating", [])
+    tables = [tables] if isinstance(tables, dict) else tables
+    if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
+        given.refuse("rating", f"must be a table [rating] or several [[rating]], not {tables!r}")
+    ratings = []
+    for number, table in enumerate(tables, start=1):
+        one = _Given(given.path, {f"rating {number}, {key}": value for key, value in table.items()})
+        keys = {key: f"rating {number}, {key}" for key in _RATING_KEYS}
+        one.refuse_others(tuple(keys.values()))
+        scheme, version, elements = (one.text(key) for key in keys.values())
+        if scheme is None:
+            given.refuse(keys["scheme"], "is missing: the name of a scheme (tunneldb rating list)")
+        if elements is None:
+            given.refuse(keys["elements"], "is missing: the name of a division of the tunnel (tunneldb elements list)")
+        ratings.append(RatingRequest(scheme, version, elements))
+    return tuple(ratings)
+
+
+def _headline(given: _Given, ratings: tuple[RatingRequest, ...], waterproofing: str | None) -> str:
+    headline = given.text("headline") or HEADLINES[0]
+    if headline not in HEADLINES:
+        given.refuse("headline", f"{headline!r} is none of {', '.join(HEADLINES)}")
+    if headline == "rating" and not ratings:
+        given.refuse("headline", "'rating' needs a table [rating] with scheme and elements")
+    if headline == "waterproofing" and waterproofing is None:
+        given.refuse("headline", f"'waterproofing' needs a standard: waterproofing = \"{STANDARDS[0]}\"")
+    return headline
+
+
+def _headline_text(given: _Given, headline: str) -> str | None:
+    value = given.text("headline_text")
+    if value is None:
+        return None
+    if headline != "rating":
+        given.refuse("headline_text", 'needs headline = "rating"')
+    names = set(_NAME.findall(value))
+    if re.search(r"[{}]", _NAME.sub("", value)) or names - set(HEADLINE_NAMES) or "{result}" not in names:
+        given.refuse(
+            "headline_text", f"{value!r} must contain {{result}}, and no other braces than {', '.join(HEADLINE_NAMES)}"
+        )
+    return value
+
+
+def _chapters(given: _Given, ratings: tuple[RatingRequest, ...], waterproofing: str | None) -> tuple[str, ...]:
     chapters = given.values.get("chapters", list(CHAPTERS))
     if not isinstance(chapters, list) or not chapters:
         given.refuse("chapters", f"must be a list of names, not {chapters!r}")
@@ -200,8 +292,10 @@ def _chapters(given: _Given, scheme: str | None) -> tuple[str, ...]:
             given.refuse("chapters", f"unknown chapter {name!r}; known are {', '.join(CHAPTERS)}")
         if chapters.count(name) > 1:
             given.refuse("chapters", f"{name!r} occurs {chapters.count(name)} times")
-    if scheme is None and "classes" in given.values.get("chapters", []):
-        given.refuse("chapters", f"'classes' needs a rating scheme: scheme = \"{SCHEMES[0]}\"")
+    if waterproofing is None and "classes" in given.values.get("chapters", []):
+        given.refuse("chapters", f"'classes' needs a standard: waterproofing = \"{STANDARDS[0]}\"")
+    if not ratings and "rating" in given.values.get("chapters", []):
+        given.refuse("chapters", "'rating' needs a table [rating] with scheme and elements")
     return tuple(chapters)
 
 

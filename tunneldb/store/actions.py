@@ -35,8 +35,8 @@ def list_actions(
     """Return the actions of a tunnel by due date, those without one last; of these states, or overdue ones, or of a survey."""
     query = sql.SQL(
         "SELECT {} FROM tunnel_api.action a WHERE a.tunnel_id = %(tunnel)s"
-        " AND (%(states)s::text[] = '{{}}' OR a.state = ANY (%(states)s)) AND (NOT %(overdue)s OR a.overdue) AND (%(survey)s::text IS NULL OR a.survey = %(survey)s)"
-        " ORDER BY a.due NULLS LAST, a.chainage_from, a.id"
+        " AND (%(states)s::text[] = '{{}}' OR a.state = ANY (%(states)s)) AND (NOT %(overdue)s OR a.overdue)"
+        " AND (%(survey)s::text IS NULL OR a.survey = %(survey)s) ORDER BY a.due NULLS LAST, a.chainage_from, a.id"
     ).format(sql.SQL(", ").join(sql.Identifier("a", name) for name in READ))
     values = {"tunnel": tunnel_id, "states": list(states), "overdue": overdue, "survey": survey}
     return conn.cursor(row_factory=dict_row).execute(query, values).fetchall()
@@ -80,7 +80,7 @@ def remove_action(conn: psycopg.Connection[Any], action_id: int) -> None:
         raise UserError(f"there is no action {action_id}: tunneldb actions list TUNNEL")
 
 
-def _execute(conn: psycopg.Connection[Any], query: sql.Composable, values: Sequence[Any]) -> tuple[Any, ...] | None:
+def _execute(conn: psycopg.Connection[Any], query: sql.SQL | sql.Composed, values: Sequence[Any]) -> tuple[Any, ...] | None:
     try:
         return conn.execute(query, values).fetchone()
     except (psycopg.errors.DataError, psycopg.errors.IntegrityError, psycopg.errors.FeatureNotSupported) as error:

@@ -67,9 +67,11 @@ OF_FILES: tuple[tuple[str, str], ...] = (
     ("stations.csv", "members {seeds}/cloud.las --stations {file} --intensity intensity --intensity-kind linear -o {out}.gpkg"),
     ("axis.csv", "serve --no-open --port 0 --certificate {file} --key {seeds}/axis.csv"),
     ("axis.csv", "serve --no-open --port 0 --certificate {seeds}/axis.csv --key {file}"),
+    ("signed.html", "report --verify {file}"),
     ("template.toml", "report demo-2024 --template {file} -o {out}.html"),
     ("elements.csv", "elements add demo {new} --file {file}"),
     ("rating.toml", "rating add {file}"),
+    ("actions.csv", "actions import demo {file}"),
 )
 """Files, and what reads them: each command and option that takes a file is among them."""
 
@@ -90,6 +92,13 @@ OF_WORDS: tuple[str, ...] = (
     "profile add demo {new} {seeds}/profile.csv {stretch}", "profile list demo", "profile remove demo {new}",
     "elements add demo {new} --length 10", "elements list demo", "elements remove demo {new}", "rating list",
     "rating show example", "rating remove {new} 1", "rating apply demo-2024 --elements blocks --scheme example",
+    "rating compare demo-2024 --elements blocks --scheme example --scheme example:1",
+    "rating change demo-2024 --elements blocks --scheme example",
+    "actions list demo", "actions add demo-2024 --measure seal --from 12+310 --to 12+320", "actions set 1 --state done",
+    "actions remove 999", "actions export demo -o {out}.xlsx",
+    "alarms add demo {new} --quantity ovality --warning 0.01 --alarm 0.02", "alarms list demo", "alarms remove demo {new}",
+    "alarms add demo {new} --quantity convergence --warning 0.01 --alarm 0.02", "alarms check demo -o {out}.csv",
+    "alarms add demo {new} --quantity growth --step 50 --warning 0.01 --alarm 0.02",
     "deviation demo-2024 -o {out}.csv", "thickness demo-2024 scan-2024", "evenness demo-2024", "compare demo-2024 scan-2024",
     "clearance demo-2024 --gauge {seeds}/profile.csv --track single", "unroll demo-2024 {seeds}/points.csv",
     "ground {seeds}/cloud.las -o {out}.laz", "intensity demo-2024 -o {out}.png", "image demo-2024 -o {out}",
@@ -107,6 +116,7 @@ UNTRIED = {
     "inspect": "has no options",
     "findings import": "what goes wrong lies in its file",
     "rating add": "what goes wrong lies in its file",
+    "actions import": "what goes wrong lies in its file",
     "survey remove-file": "has no options but the file",
     "tunnel find-axis": "what goes wrong lies in its file",
     "serve": "serves until it is told to leave",
@@ -119,9 +129,10 @@ UNTRIED = {
 """Verbs that are in none of OF_WORDS, and why."""
 
 REFUSED = (
-    "clearance", "compare", "elements remove", "evaluate", "export scan-2024", "findings undo", "ground", "intensity",
-    "learn demo-2024", "members demo", "profile remove", "rating remove", "register", "run", "serve", "spheres",
-    "survey remove-file", "thickness", "tunnel add {new} {file}", "tunnel find-axis", "tunnel remove",
+    "actions remove", "alarms remove", "clearance", "compare", "elements remove", "evaluate", "export scan-2024",
+    "findings undo", "ground", "intensity", "learn demo-2024", "members demo", "profile remove", "rating change",
+    "rating remove", "register", "run", "serve", "spheres", "survey remove-file", "thickness", "tunnel add {new} {file}",
+    "tunnel find-axis", "tunnel remove",
 )  # fmt: skip
 """What right commands begin with that the survey made by hand has no rows for: they are to say so in one line."""
 

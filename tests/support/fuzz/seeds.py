@@ -64,6 +64,15 @@ def write_seeds(folder: Path, axis: np.ndarray, surface: Surface) -> None:
     _write(folder / "start.csv", f"file,x,y,within\npoints.csv,{axis[5][0]:.1f},{axis[5][1]:.1f},3")
     _write(folder / "elements.csv", "name,chainage_from,chainage_to,clock_from,clock_to\nvault,12300,12350,9,3\n")
     _write(folder / "rating.toml", RATING.read_text("utf-8"))
+    _write(
+        folder / "actions.csv",
+        "id,survey,chainage_from,chainage_to,measure,due,cost,currency\n,demo-2024,12310,12312,seal,2030-01-31,12.5,EUR\n",
+    )
+    _write(
+        folder / "signed.html",
+        '<script type="application/json" id="record">{"survey": "demo-2024", "low": 12300.0, "high": 12500.0, "at":'
+        ' "2999-01-01T00:00:00+00:00", "digest": "0123456789abcdef", "leaks": true, "listed": 1000, "ratings": []}</script>',
+    )
     _write(folder / "template.toml", 'client = "Owner"\nlanguage = "de"\n\n[headings]\n"Leak" = "Wasserzutritt"\n')
     for name in ("points", "axis"):
         lines = (DATA / "wriggle" / f"{name}.csv").read_text().splitlines()[: 60 if name == "points" else None]

@@ -77,6 +77,7 @@ ARGUMENTS = {
     "double precision[]": ["array_fill('12345'::float8, ARRAY[100000])"],
     "geometry": ["ST_MakeLine(ST_MakePoint(0, 0, 0), ST_MakePoint(1e7, 0, 0))", "ST_MakePoint(1e300, 1e300, 1e300)"],
     "boolean": ["true", "false"],
+    "timestamp with time zone": ["now()", "'infinity'", "'-infinity'", "'2001-01-01'"],
     "integer[]": ["'{1,2}'", "array_fill(240, ARRAY[100000])"],
 }
 """Extreme arguments of functions, by type."""
@@ -85,6 +86,7 @@ FREE = "ST_SetSRID('POLYGON((12350 0.5,12350.2 0.5,12350.2 0.7,12350 0.5))'::geo
 ROWS = {
     "region": {"survey": f"'{SURVEY}'", "kind": "'dry'", "geom": FREE},
     "finding_photo": {"finding_id": "1", "path": "'a.jpg'"},
+    "action": {"survey": f"'{SURVEY}'", "chainage_from": "12310", "chainage_to": "12320", "measure": "'seal'"},
     "finding_kind": {
         "code": "'a' || floor(1e9 * random())::bigint", "label": "'a'", "geometries": "'{polygon}'", "position": "1",
         "wet": "false", "active": "true",

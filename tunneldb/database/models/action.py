@@ -56,3 +56,13 @@ class Action(Base):
     added_at: Mapped[dt.datetime] = mapped_column(server_default=CLOCK, comment="Time when it was added")
     changed_by: Mapped[str | None] = mapped_column(comment="Role that changed it last")
     changed_at: Mapped[dt.datetime | None] = mapped_column(comment="Time of the last change")
+
+
+class AsOf(Base):
+    """Moment at which a transaction shows a survey; a trigger refuses its commit, so that the table is always empty."""
+
+    __tablename__ = "as_of"
+    __table_args__ = {"comment": "Empty: a row marks a transaction that shows the past, and a trigger refuses its commit"}  # noqa: RUF012
+
+    id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
+    moment: Mapped[dt.datetime] = mapped_column(comment="Moment that is shown")

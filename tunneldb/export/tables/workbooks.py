@@ -63,6 +63,7 @@ def write_findings(
     counts: Sequence[tuple[KindCount, Sequence[KindCount]]],
     severities: dict[int, str],
     regions: Sequence[DryRegion],
+    rating: Sequence[Sheet] = (),
 ) -> None:
     """Write findings as a workbook.
 
@@ -80,6 +81,8 @@ def write_findings(
         The owner's words.
     regions : sequence of DryRegion
         Dry regions of the stretch.
+    rating : sequence of Sheet
+        Sheets of a rating.
     """
     columns = [column for column, _ in _FINDING]
     write_workbook(
@@ -97,6 +100,7 @@ def write_findings(
             _missed(findings.coverage, findings.remarks),
             Sheet("Left out", columns, [_cells(row, _FINDING) for row in others]),
             _regions(regions),
+            *rating,
         ],
         title,
     )

@@ -16,12 +16,14 @@ BULK = ("point", "image")
 
 EXCLUDED = {
     "alembic_version": "the schema's own",
+    "as_of": "always empty",
     "stage": "made anew by tunneldb init",
     "stage_input": "made anew by tunneldb init",
     "worker": "who serves the queue at the moment",
     "incoming": "files that wait to be read, which a batch asks for again",
     "segmentation_network": "files of owners, which have the same numbers in every database",
     "finding_sum": "sums that triggers keep",
+    "alarm_limit": "the owner's for a tunnel in this database, added by command",
     "rating_scheme": "the owner's for all surveys, added from a file",
     "rating_rule": "the owner's for all surveys, added from a file",
     "waterproof": "statistics of kilometres, worked out anew",
