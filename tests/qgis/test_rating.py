@@ -78,8 +78,8 @@ def test_a_review_changes_the_drawn_rating(conn: psycopg.Connection, example: st
 
 def test_pictures_show_red_grey_and_hatches(conn: psycopg.Connection, partly: None, tmp_path: Path) -> None:
     conn.execute(
-        "INSERT INTO tunnel_api.action (survey, finding_id, measure, due) VALUES ('demo-2024', 3, 'seal the joint', '2020-01-01'),"
-        " ('demo-2024', 6, 'drain', NULL)"
+        "INSERT INTO tunnel_api.action (survey, finding_id, measure, due) VALUES"
+        " ('demo-2024', 3, 'seal the joint', '2020-01-01'), ('demo-2024', 6, 'drain', NULL)"
     )
     conn.commit()
     project = tmp_path / "demo.qgz"

@@ -37,11 +37,24 @@ def test_a_rating_is_that_of_the_database(signed_in: SignIn, conn: psycopg.Conne
     for _ in range(2):
         found = browser.get(f"{SURVEY}/rating?elements={elements}&scheme=example").json()
         known = ask(conn, "SELECT * FROM tunnel_api.rating(%s, %s, 'example')", [NAME, elements])
-        for name in ("number", "name", "inspected_share", "findings", "result", "level", "complete", "finding_id", "why", "remark"):
+        for name in (
+            "number",
+            "name",
+            "inspected_share",
+            "findings",
+            "result",
+            "level",
+            "complete",
+            "finding_id",
+            "why",
+            "remark",
+        ):
             assert [one[name] for one in found["elements"]] == [row[name] for row in known], name
         unseen = next(one for one in found["elements"] if one["number"] == 4)
         assert (unseen["result"], unseen["result_text"], unseen["boxes"]) == (None, "not rated", [])
-        assert all(len(one["boxes"]) == (2 if "invert" in one["name"] else 1) for one in found["elements"] if one["number"] != 4)
+        assert all(
+            len(one["boxes"]) == (2 if "invert" in one["name"] else 1) for one in found["elements"] if one["number"] != 4
+        )
         conn.execute("UPDATE tunnel.finding SET review = 'rejected'")
         conn.commit()
 

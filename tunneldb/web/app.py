@@ -15,7 +15,21 @@ from starlette.middleware.gzip import GZipMiddleware
 from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 
-from tunneldb.web import actions, exports, findings, health, ogc, photos, pictures, points, rating, sections, sign_in, surveys, tiles
+from tunneldb.web import (
+    actions,
+    exports,
+    findings,
+    health,
+    ogc,
+    photos,
+    pictures,
+    points,
+    rating,
+    sections,
+    sign_in,
+    surveys,
+    tiles,
+)
 from tunneldb.web.config import Desk
 from tunneldb.web.pages import FOLDER, STATIC, worker
 from tunneldb.web.route import MAX_LARGE, route

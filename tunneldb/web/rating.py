@@ -31,7 +31,9 @@ def change(call: Call) -> Any:
     with call.session.connection() as conn:
         survey, elements, scheme = _asked(call, conn)
         rows = rating.change(conn, survey, elements, scheme["name"], scheme["version"])
-    earlier = next(({"survey": row["earlier_survey"], "date": row["earlier_date"]} for row in rows if row["earlier_survey"]), None)
+    earlier = next(
+        ({"survey": row["earlier_survey"], "date": row["earlier_date"]} for row in rows if row["earlier_survey"]), None
+    )
     kept = ("id", "earlier_result", "change", "known")
     return {"earlier": earlier, "elements": [{name: row[name] for name in kept} for row in rows]}
 

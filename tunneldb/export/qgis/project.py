@@ -78,7 +78,9 @@ class Rating:
         values = {"element_set": self.element_set, "scheme": self.scheme, "version": self.version}
         where = " AND ".join(f'"{column}" = {literal(value)}' for column, value in values.items())
         name = f"{self.element_set} by {self.scheme} {self.version}"
-        return [replace(layer, title=layer.title.replace("Rating", f"Rating of {name}", 1), where=where) for layer in RATING_LAYERS]
+        return [
+            replace(layer, title=layer.title.replace("Rating", f"Rating of {name}", 1), where=where) for layer in RATING_LAYERS
+        ]
 
 
 def write_project(

@@ -30,7 +30,9 @@ _ORDER = "coalesce(a.overdue, false) DESC, a.state IN ('done', 'verified'), a.du
 
 def of_tunnel(conn: psycopg.Connection[Any], tunnel_id: int) -> list[dict[str, Any]]:
     """Return the actions that all surveys of a tunnel demand, overdue ones first."""
-    return named(conn.execute(f"SELECT {_COLUMNS} FROM tunnel_api.action a WHERE a.tunnel_id = %s ORDER BY {_ORDER}", [tunnel_id]))
+    return named(
+        conn.execute(f"SELECT {_COLUMNS} FROM tunnel_api.action a WHERE a.tunnel_id = %s ORDER BY {_ORDER}", [tunnel_id])
+    )
 
 
 def read_of_finding(conn: psycopg.Connection[Any], finding_id: int) -> psycopg.Cursor[Any]:
@@ -81,4 +83,4 @@ def delete(conn: psycopg.Connection[Any], action_id: int) -> bool:
 
 
 def _typed(name: str) -> sql.Composable:
-    return sql.SQL("%s::" + WRITTEN[name])  # type: ignore[arg-type]
+    return sql.SQL("%s::" + WRITTEN[name])

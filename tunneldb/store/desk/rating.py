@@ -31,16 +31,14 @@ def schemes(conn: psycopg.Connection[Any]) -> list[dict[str, Any]]:
     )
 
 
-def rating(
-    conn: psycopg.Connection[Any], survey: Place, element_set: str, scheme: str, version: str
-) -> list[dict[str, Any]]:
+def rating(conn: psycopg.Connection[Any], survey: Place, element_set: str, scheme: str, version: str) -> list[dict[str, Any]]:
     """Return the rating of each element; boxes are its rectangles: chainage and arc from, chainage and arc to, m."""
     return named(
         conn.execute(
             "SELECT r.element_id AS id, r.number, r.name, r.label, r.chainage_from, r.chainage_to, r.clock_from, r.clock_to,"
             " r.inspected_share, r.findings, r.result, r.level, r.complete, r.result_text, r.finding_id, r.why, r.remark,"
-            " ARRAY(SELECT ARRAY[public.ST_XMin(d.geom), public.ST_YMin(d.geom), public.ST_XMax(d.geom), public.ST_YMax(d.geom)]"
-            " FROM public.ST_Dump(r.geom) d) AS boxes"
+            " ARRAY(SELECT ARRAY[public.ST_XMin(d.geom), public.ST_YMin(d.geom), public.ST_XMax(d.geom),"
+            " public.ST_YMax(d.geom)] FROM public.ST_Dump(r.geom) d) AS boxes"
             " FROM tunnel_api.rating_unrolled r WHERE r.survey = %s AND r.element_set = %s AND r.scheme = %s AND r.version = %s"
             " ORDER BY r.number",
             [survey.name, element_set, scheme, version],
@@ -48,9 +46,7 @@ def rating(
     )
 
 
-def change(
-    conn: psycopg.Connection[Any], survey: Place, element_set: str, scheme: str, version: str
-) -> list[dict[str, Any]]:
+def change(conn: psycopg.Connection[Any], survey: Place, element_set: str, scheme: str, version: str) -> list[dict[str, Any]]:
     """Return the change of each element's rating since the earlier inspection of the tunnel."""
     return named(
         conn.execute(
