@@ -335,11 +335,11 @@ def write_action(project: QgsProject) -> dict[str, Any]:
     column = layer.fields().indexOf
     assert layer.startEditing(), "cannot be edited"
     feature = QgsVectorLayerUtils.createFeature(
-        layer, QgsGeometry.fromPointXY(QgsPointXY(12360.1234, 1.5)), {column("measure"): "seal the joint"}
+        layer, QgsGeometry.fromPointXY(QgsPointXY(12360.1234, 1.5)), {column("measure"): "inject the joint"}
     )
     assert layer.addFeature(feature)
     added = _commit(layer)
-    (stored,) = [one for one in layer.getFeatures() if one["measure"] == "seal the joint"]
+    (stored,) = [one for one in layer.getFeatures() if one["measure"] == "inject the joint"]
     assert layer.startEditing()
     for name, value in (("state", "ordered"), ("due", QDate(2021, 3, 31)), ("cost", 1200.5), ("currency", "EUR")):
         assert layer.changeAttributeValue(stored.id(), column(name), value), name

@@ -20,6 +20,12 @@ def ask(conn: psycopg.Connection, query: str, values: Any = ()) -> list[dict[str
     return conn.cursor(row_factory=dict_row).execute(query, values).fetchall()
 
 
+@pytest.fixture(autouse=True)
+def no_action(conn: psycopg.Connection, example: str) -> None:
+    conn.execute("DELETE FROM tunnel.action")
+    conn.commit()
+
+
 def test_what_can_be_chosen(signed_in: SignIn) -> None:
     found = signed_in("viola_web").get(f"{SURVEY}/rating/choices").json()
     assert [(one["name"], one["elements"]) for one in found["element_sets"]] == [("blocks", 4), ("zones", 16)]
