@@ -143,3 +143,30 @@ def test_a_pdf_is_verified(dsn: str, example: str, conn: psycopg.Connection, tmp
 def test_wrong_words_are_refused(dsn: str, example: str, tmp_path: Path, words: list[str], message: str) -> None:
     (tmp_path / "text.html").write_text("<p>digest")
     assert message in run("report", *(word.format(folder=tmp_path) for word in words), code=2).output
+
+
+LISTS = (
+    ["findings", NAME, "--state", "all"],
+    ["leaks", NAME],
+    ["leaks", NAME, "--by-km"],
+    ["rating", "apply", NAME, "--elements", "blocks", "--scheme", "example"],
+    ["actions", "list", "demo", "--survey", NAME],
+)
+
+
+@pytest.mark.parametrize("words", LISTS, ids=lambda words: " ".join(words[:2]))
+def test_lists_as_of_a_moment(dsn: str, example: str, conn: psycopg.Connection, words: list[str]) -> None:
+    """Each list after edits is the one of before."""
+    before = run(*words).output
+    (moment,) = conn.execute("SELECT clock_timestamp()").fetchone()  # type: ignore[misc]
+    conn.rollback()
+    edit(conn)
+    assert run(*words).output != before
+    then = run(*words, "--as-of", moment.isoformat()).output
+    assert then == before
+    assert "was added after" in run(*words, "--as-of", "2001-01-01", code=2).output
+    assert conn.execute("SELECT count(*) FROM tunnel_api.audit WHERE at > %s", [moment]).fetchone() == (4,)
+
+
+def test_actions_of_the_past_need_their_survey(dsn: str, example: str) -> None:
+    assert "--as-of needs --survey" in run("actions", "list", "demo", "--as-of", "2026-01-01", code=2).output

@@ -13,7 +13,8 @@ import psycopg
 from tunneldb.cli.coverage import say_coverage
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import add_to_json, command, notify, printable
-from tunneldb.cli.param_types import FilePath, Moment, WholeRange
+from tunneldb.cli.param_types import FilePath, WholeRange
+from tunneldb.cli.past import as_of_option
 from tunneldb.cli.progress import bar
 from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
 from tunneldb.counted import counted
@@ -101,10 +102,7 @@ PHOTO_SERVER = _PhotoServer()
     metavar="N",
     help="Most leaks to list and draw, the largest, rejected ones last. Sums include all.",
 )
-@click.option(
-    "--as-of", "moment", type=Moment(), metavar="MOMENT",
-    help="Report the survey as it was on a day (2026-03-31, its end) or at a moment (2026-03-31T12:00).",
-)  # fmt: skip
+@as_of_option
 @click.option(
     "--verify", "signed", type=FilePath(dir_okay=False), metavar="FILE",
     help="Compare the digest of a report, .html or .pdf, with the database; write nothing.",

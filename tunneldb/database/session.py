@@ -100,7 +100,7 @@ def as_of(connection: psycopg.Connection[Any], survey: str, moment: dt.datetime 
         connection.execute("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ")
         try:
             connection.execute("SELECT tunnel_api.show_as_of(%s, %s)", [survey, moment])
-        except psycopg.errors.InvalidParameterValue as error:
+        except (psycopg.errors.InvalidParameterValue, psycopg.errors.NoDataFound) as error:
             hint = f" {error.diag.message_hint}" if error.diag.message_hint else ""
             raise UserError(f"{error.diag.message_primary}.{hint}") from None
         except psycopg.errors.InsufficientPrivilege:
