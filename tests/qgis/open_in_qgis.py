@@ -1,7 +1,8 @@
 """Open a project with real QGIS and say what it sees, as JSON; runs under the Python that has PyQGIS.
 
 Usage: open_in_qgis.py PROJECT describe | render THEME PNG | move_vertex N DX DZ | review ID STATUS REMARK [LAYER [KIND]]
-       | draw KIND | draw_findings | write_action | results LAYER | add VIEW | draw_layer LAYER XMIN,YMIN,XMAX,YMAX PNG | numbers LAYER
+       | draw KIND | draw_findings | write_action | results LAYER | add VIEW
+       | draw_layer LAYER XMIN,YMIN,XMAX,YMAX PNG | numbers LAYER
        | atlas PDF [LAYOUT] | preview | where CHAINAGE ARC | labels LAYER | space [PNG]
 """
 
@@ -334,11 +335,11 @@ def write_action(project: QgsProject) -> dict[str, Any]:
     column = layer.fields().indexOf
     assert layer.startEditing(), "cannot be edited"
     feature = QgsVectorLayerUtils.createFeature(
-        layer, QgsGeometry.fromPointXY(QgsPointXY(12360.1234, 1.5)), {column("measure"): "seal the joint"}
+        layer, QgsGeometry.fromPointXY(QgsPointXY(12360.1234, 1.5)), {column("measure"): "inject the joint"}
     )
     assert layer.addFeature(feature)
     added = _commit(layer)
-    (stored,) = [one for one in layer.getFeatures() if one["measure"] == "seal the joint"]
+    (stored,) = [one for one in layer.getFeatures() if one["measure"] == "inject the joint"]
     assert layer.startEditing()
     for name, value in (("state", "ordered"), ("due", QDate(2021, 3, 31)), ("cost", 1200.5), ("currency", "EUR")):
         assert layer.changeAttributeValue(stored.id(), column(name), value), name
@@ -363,7 +364,10 @@ def results(project: QgsProject, layer_id: str) -> dict[str, Any]:
     for feature in layer.getFeatures():
         context.expressionContext().setFeature(feature)
         keys = renderer.legendKeysForFeature(feature, context)
-        found[feature["name"]] = [sorted(labels[key] for key in keys if labels.get(key)), text.evaluate(context.expressionContext())]
+        found[feature["name"]] = [
+            sorted(labels[key] for key in keys if labels.get(key)),
+            text.evaluate(context.expressionContext()),
+        ]
     renderer.stopRender(context)
     return {"elements": found, "legend": list(labels.values()), "title": layer.name()}
 

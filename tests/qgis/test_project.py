@@ -649,7 +649,7 @@ def test_inspector_edits_and_what_is_stale_can_be_recomputed(conn: psycopg.Conne
     "view",
     [
         "leak_map", "leak_3d", "leak_unrolled", "axis_vertex", "segment", "section", "target_sphere", "cluster", "ground",
-        "action_map", "action_unrolled",
+        "action_unrolled",
     ],
 )  # fmt: skip
 def test_layer_added_by_hand_finds_its_style_srid_and_height(shared: Path, view: str) -> None:

@@ -78,8 +78,8 @@ def test_a_review_changes_the_drawn_rating(conn: psycopg.Connection, example: st
 
 def test_pictures_show_red_grey_and_hatches(conn: psycopg.Connection, partly: None, tmp_path: Path) -> None:
     conn.execute(
-        "INSERT INTO tunnel_api.action (survey, finding_id, measure, due) VALUES ('demo-2024', 3, 'seal the joint', '2020-01-01'),"
-        " ('demo-2024', 6, 'drain', NULL)"
+        "INSERT INTO tunnel_api.action (survey, finding_id, measure, due) VALUES"
+        " ('demo-2024', 3, 'seal the joint', '2020-01-01'), ('demo-2024', 6, 'drain', NULL)"
     )
     conn.commit()
     project = tmp_path / "demo.qgz"
@@ -102,6 +102,7 @@ def test_an_action_is_drawn_and_changed(conn: psycopg.Connection, example: str, 
     """Also in the project of a later survey: it shows the actions of the tunnel."""
     add_later_survey(conn)
     conn.execute("DELETE FROM tunnel.image")
+    conn.execute("DELETE FROM tunnel.action")
     conn.execute("INSERT INTO tunnel_api.action (survey, finding_id, measure) VALUES ('demo-2024', 1, 'drain')")
     conn.commit()
     project = tmp_path / "later.qgz"
@@ -115,7 +116,7 @@ def test_an_action_is_drawn_and_changed(conn: psycopg.Connection, example: str, 
     assert done["due"] == "DateTime"
     row = conn.execute(
         "SELECT survey, chainage_from, chainage_to, arc, urgency, state, due::text, cost::float8, currency, overdue"
-        " FROM tunnel_api.action WHERE measure = 'seal the joint'"
+        " FROM tunnel_api.action WHERE measure = 'inject the joint'"
     ).fetchone()
     assert row == ("demo-2026", 12360.123, 12360.123, 1.5, "planned", "ordered", "2021-03-31", 1200.5, "EUR", True)
     assert act(project, "describe")["layers"]["action_map"]["features"] == 2

@@ -343,8 +343,8 @@ def test_the_layers_state_the_rating(conn: psycopg.Connection, example: str, vie
         assert (row["result_text"], row["levels"]) == (words, 4)
     (row,) = ask(
         conn,
-        f"SELECT sum(public.ST_Area(geom)) AS area, public.ST_Area(public.ST_Union(geom)) AS joined, bool_and(public.ST_IsValid(geom))"
-        f" AS valid FROM tunnel_api.{view} WHERE {LAYER}",
+        "SELECT sum(public.ST_Area(geom)) AS area, public.ST_Area(public.ST_Union(geom)) AS joined,"
+        f" bool_and(public.ST_IsValid(geom)) AS valid FROM tunnel_api.{view} WHERE {LAYER}",
         [NAME, element_set],
     )
     (girth,) = conn.execute(

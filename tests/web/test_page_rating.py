@@ -71,7 +71,9 @@ def test_the_table_is_that_of_the_database(page: Page, database: psycopg.Connect
     expect(none.locator(".c1")).to_have_text("not rated")
     expect(none.locator(".c2")).to_have_text("not inspected")
     for row in (partly, none):
-        red, green, blue = map(int, re.findall(r"\d+", row.locator(".swatch").evaluate("(n) => getComputedStyle(n).backgroundColor"))[:3])
+        red, green, blue = map(
+            int, re.findall(r"\d+", row.locator(".swatch").evaluate("(n) => getComputedStyle(n).backgroundColor"))[:3]
+        )
         assert not (green > red + 20 and green > blue + 20), (red, green, blue)
     expect(panel.locator(".totals li").last).to_have_text("not rated: 1")
     panel.get_by_label("Order").select_option("worst")
@@ -107,9 +109,11 @@ def test_zones_and_a_review_that_changes_the_rating(page: Page, database: psycop
 
 def test_change_since_the_earlier_inspection(ines_context: BrowserContext, database: psycopg.Connection) -> None:
     """The later survey found no leak: what was inspected in full became better, and of the rest nothing is certain."""
-    rows = database.cursor(row_factory=dict_row).execute(
-        "SELECT * FROM tunnel_api.rating_change(%s, 'blocks', 'example')", [LATER]
-    ).fetchall()
+    rows = (
+        database.cursor(row_factory=dict_row)
+        .execute("SELECT * FROM tunnel_api.rating_change(%s, 'blocks', 'example')", [LATER])
+        .fetchall()
+    )
     with opened(ines_context, f"/#/{LATER}?tab=rating") as page:
         panel = page.locator("#panel-body")
         panel.get_by_label("Order").select_option("chainage")
@@ -145,8 +149,18 @@ def test_an_inspector_adds_and_changes_an_action(page: Page, database: psycopg.C
     expect(card).to_contain_text("Due 2021-03-31; Works Ltd; 1\u202f200.50 EUR")
     expect(card).to_contain_text("not compared")
     (row,) = stored(database)
-    assert (row["finding_id"], row["measure"], row["urgency"], str(row["due"])) == (1, "Inject the joint", "urgent", "2021-03-31")
-    assert (float(row["cost"]), row["currency"], row["remark"], row["added_by"]) == (1200.5, "EUR", "scaffold needed", "ines_web")
+    assert (row["finding_id"], row["measure"], row["urgency"], str(row["due"])) == (
+        1,
+        "Inject the joint",
+        "urgent",
+        "2021-03-31",
+    )
+    assert (float(row["cost"]), row["currency"], row["remark"], row["added_by"]) == (
+        1200.5,
+        "EUR",
+        "scaffold needed",
+        "ines_web",
+    )
     card.get_by_role("button", name="Change").click()
     form = panel.get_by_role("form", name=f"Action {row['id']}")
     form.get_by_label("State").select_option("done")
@@ -230,7 +244,9 @@ def test_axe_and_the_width_of_a_phone(context_of: Contexts, database: psycopg.Co
             if name == "Rating":
                 page.locator("#panel-body").get_by_role("button", name="block 1", exact=True).click()
             found[name] = accessibility_findings(page)
-            assert not page.evaluate("document.documentElement.scrollWidth > innerWidth || document.body.scrollWidth > innerWidth")
+            assert not page.evaluate(
+                "document.documentElement.scrollWidth > innerWidth || document.body.scrollWidth > innerWidth"
+            )
         page.get_by_role("button", name="Add action for finding 1").click()
         found["form"] = accessibility_findings(page)
         tab(page, "Finding")

@@ -20,6 +20,12 @@ def ask(conn: psycopg.Connection, query: str, values: Any = ()) -> list[dict[str
     return conn.cursor(row_factory=dict_row).execute(query, values).fetchall()
 
 
+@pytest.fixture(autouse=True)
+def no_action(conn: psycopg.Connection, example: str) -> None:
+    conn.execute("DELETE FROM tunnel.action")
+    conn.commit()
+
+
 def test_what_can_be_chosen(signed_in: SignIn) -> None:
     found = signed_in("viola_web").get(f"{SURVEY}/rating/choices").json()
     assert [(one["name"], one["elements"]) for one in found["element_sets"]] == [("blocks", 4), ("zones", 16)]
@@ -37,11 +43,24 @@ def test_a_rating_is_that_of_the_database(signed_in: SignIn, conn: psycopg.Conne
     for _ in range(2):
         found = browser.get(f"{SURVEY}/rating?elements={elements}&scheme=example").json()
         known = ask(conn, "SELECT * FROM tunnel_api.rating(%s, %s, 'example')", [NAME, elements])
-        for name in ("number", "name", "inspected_share", "findings", "result", "level", "complete", "finding_id", "why", "remark"):
+        for name in (
+            "number",
+            "name",
+            "inspected_share",
+            "findings",
+            "result",
+            "level",
+            "complete",
+            "finding_id",
+            "why",
+            "remark",
+        ):
             assert [one[name] for one in found["elements"]] == [row[name] for row in known], name
         unseen = next(one for one in found["elements"] if one["number"] == 4)
         assert (unseen["result"], unseen["result_text"], unseen["boxes"]) == (None, "not rated", [])
-        assert all(len(one["boxes"]) == (2 if "invert" in one["name"] else 1) for one in found["elements"] if one["number"] != 4)
+        assert all(
+            len(one["boxes"]) == (2 if "invert" in one["name"] else 1) for one in found["elements"] if one["number"] != 4
+        )
         conn.execute("UPDATE tunnel.finding SET review = 'rejected'")
         conn.commit()
 

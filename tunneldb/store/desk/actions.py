@@ -83,4 +83,4 @@ def delete(conn: psycopg.Connection[Any], action_id: int) -> bool:
 
 
 def _typed(name: str) -> sql.Composable:
-    return sql.SQL("%s::" + WRITTEN[name])  # type: ignore[arg-type]
+    return sql.SQL("%s::" + WRITTEN[name])

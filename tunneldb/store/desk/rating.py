@@ -37,8 +37,8 @@ def rating(conn: psycopg.Connection[Any], survey: Place, element_set: str, schem
         conn.execute(
             "SELECT r.element_id AS id, r.number, r.name, r.label, r.chainage_from, r.chainage_to, r.clock_from, r.clock_to,"
             " r.inspected_share, r.findings, r.result, r.level, r.complete, r.result_text, r.finding_id, r.why, r.remark,"
-            " ARRAY(SELECT ARRAY[public.ST_XMin(d.geom), public.ST_YMin(d.geom), public.ST_XMax(d.geom), public.ST_YMax(d.geom)]"
-            " FROM public.ST_Dump(r.geom) d) AS boxes"
+            " ARRAY(SELECT ARRAY[public.ST_XMin(d.geom), public.ST_YMin(d.geom), public.ST_XMax(d.geom),"
+            " public.ST_YMax(d.geom)] FROM public.ST_Dump(r.geom) d) AS boxes"
             " FROM tunnel_api.rating_unrolled r WHERE r.survey = %s AND r.element_set = %s AND r.scheme = %s AND r.version = %s"
             " ORDER BY r.number",
             [survey.name, element_set, scheme, version],
