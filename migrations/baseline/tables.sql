@@ -375,14 +375,14 @@ CREATE TABLE tunnel.element_set (
     CONSTRAINT element_set_pkey PRIMARY KEY (id),
     CONSTRAINT element_set_tunnel_id_name_key UNIQUE (tunnel_id, name),
     CONSTRAINT element_set_name_at_most_100_characters_check CHECK (char_length(name) <= 100),
-    CONSTRAINT element_set_source_check CHECK (source IN ('file', 'length', 'rings')),
+    CONSTRAINT element_set_source_check CHECK (source IN ('file', 'length', 'rings', 'joints')),
     CONSTRAINT element_set_tunnel_id_fkey FOREIGN KEY(tunnel_id) REFERENCES tunnel.tunnel (id) ON DELETE CASCADE
 );
 COMMENT ON TABLE tunnel.element_set IS 'Divisions of tunnels into elements that are rated: rings, blocks, stretches, zones';
 COMMENT ON COLUMN tunnel.element_set.id IS 'Key';
 COMMENT ON COLUMN tunnel.element_set.tunnel_id IS 'Tunnel that the row belongs to';
 COMMENT ON COLUMN tunnel.element_set.name IS 'Name';
-COMMENT ON COLUMN tunnel.element_set.source IS 'file, length (equal stretches) or rings (of a survey)';
+COMMENT ON COLUMN tunnel.element_set.source IS 'file, length (equal stretches), rings or joints (of a survey)';
 COMMENT ON COLUMN tunnel.element_set.added_at IS 'Time when it was added';
 
 CREATE TABLE tunnel.gauge (

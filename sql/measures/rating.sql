@@ -11,7 +11,7 @@ SELECT e.id, t.id AS tunnel_id, t.name AS tunnel, d.name AS element_set, d.sourc
 COMMENT ON VIEW tunnel_api.element IS
     'Elements of tunnels that are rated: rings, blocks, stretches or zones, written by tunneldb elements add';
 COMMENT ON COLUMN tunnel_api.element.element_set IS 'Name of the division of the tunnel';
-COMMENT ON COLUMN tunnel_api.element.source IS 'Source of the division: file, length or rings';
+COMMENT ON COLUMN tunnel_api.element.source IS 'Source of the division: file, length, rings or joints';
 COMMENT ON COLUMN tunnel_api.element.number IS 'Number in its division, from 1';
 COMMENT ON COLUMN tunnel_api.element.name IS 'Name of the element';
 COMMENT ON COLUMN tunnel_api.element.clock_from IS

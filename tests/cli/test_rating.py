@@ -158,6 +158,29 @@ def test_rings_and_zones_become_elements(dsn: str, example: str, conn: psycopg.C
     assert len(rows) == 4 * 100
 
 
+def test_blocks_between_joints_become_elements(dsn: str, example: str, conn: psycopg.Connection) -> None:
+    """One joint spans 14 m of 24 m; three pieces make another one; those of 12 m (of the example) and 4 m bound no block."""
+    add = "INSERT INTO tunnel_api.finding_unrolled (survey, kind, geom) VALUES (%s, 'joint', public.ST_MakeEnvelope(%s, %s, %s, %s))"
+    for low, high, arc_from, arc_to in (
+        (12380, 12380.1, -9, -4),
+        (12380.1, 12380.2, -4, 1),
+        (12380, 12380.1, 2, 6),
+        (12450, 12450.1, 0, 4),
+    ):
+        conn.execute(add, [NAME, low, arc_from, high, arc_to])
+    conn.commit()
+    done("elements", "add", "demo", "between", "--joints", NAME)
+    rows = conn.execute(
+        "SELECT name, chainage_from, chainage_to FROM tunnel_api.element WHERE element_set = 'between' ORDER BY number"
+    ).fetchall()
+    assert [row[0] for row in rows] == ["block 1", "block 2", "block 3"]
+    assert [row[1] for row in rows] == pytest.approx([12300, 12380.08, 12450.05], abs=0.05)
+    assert rows[-1][2] == 12500
+    conn.execute("UPDATE tunnel_api.finding SET review = 'rejected' WHERE kind = 'joint'")
+    conn.commit()
+    assert "has no joint around half" in refused("elements", "add", "demo", "none", "--joints", NAME)
+
+
 def test_elements_of_a_file(dsn: str, example: str, conn: psycopg.Connection, tmp_path: Path) -> None:
     path = tmp_path / "blocks.csv"
     path.write_text("name,chainage_from,chainage_to,clock_from,clock_to\nportal,12300,12310,0,12\nvault 1,12310,12330,9,3\n")
@@ -188,8 +211,8 @@ def test_wrong_elements_are_refused_with_their_line(dsn: str, example: str, tmp_
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--length", "10", "--rings", NAME], "exactly one of --length M, --rings SURVEY and --file FILE"),
-        ([], "exactly one of --length M, --rings SURVEY and --file FILE"),
+        (["--length", "10", "--rings", NAME], "exactly one of --length M, --rings SURVEY, --joints SURVEY and --file FILE"),
+        ([], "exactly one of --length M, --rings SURVEY, --joints SURVEY and --file FILE"),
         (["--rings", "nothing"], "no survey 'nothing'"),
     ],
 )

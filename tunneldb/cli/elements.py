@@ -24,18 +24,27 @@ def elements() -> None:
     examples=[
         "tunneldb elements add ringo stretches --length 10",
         "tunneldb elements add ringo rings --rings ringo-2024 --zones",
-        "tunneldb elements add ringo blocks --file blocks.csv",
+        "tunneldb elements add ringo blocks --joints ringo-2024",
+        "tunneldb elements add ringo portals --file portals.csv",
     ]
 )
 @click.argument("tunnel")
 @click.argument("name")
 @click.option("--length", type=FiniteRange(0.1, 1e6), metavar="M", help="Stretches of this length, from multiples of it.")
 @click.option("--rings", "survey", metavar="SURVEY", help="Rings of a survey (tunneldb rings).")
+@click.option("--joints", metavar="SURVEY", help="Blocks between the transverse joints that a survey detected.")
 @click.option("--file", type=FilePath(dir_okay=False), metavar="FILE", help="CSV of elements.")
 @click.option("--zones", is_flag=True, help="Divide each into crown, right wall, invert and left wall by clock position.")
 @click.pass_obj
 def add(
-    settings: Settings, tunnel: str, name: str, length: float | None, survey: str | None, file: Path | None, zones: bool
+    settings: Settings,
+    tunnel: str,
+    name: str,
+    length: float | None,
+    survey: str | None,
+    joints: str | None,
+    file: Path | None,
+    zones: bool,
 ) -> None:
     """Add elements to TUNNEL as a division called NAME.
 
@@ -45,11 +54,11 @@ def add(
     from tunneldb.pipeline.rating_file import read_elements, stretches_of
     from tunneldb.store.catalog import get_tunnel
     from tunneldb.store.design import get_design_tunnel
-    from tunneldb.store.rating import ring_elements, save_elements, zoned
+    from tunneldb.store.rating import joint_elements, ring_elements, save_elements, zoned
     from tunneldb.store.survey import get_survey
 
-    if sum(given is not None for given in (length, survey, file)) != 1:
-        raise UserError("give exactly one of --length M, --rings SURVEY and --file FILE")
+    if sum(given is not None for given in (length, survey, joints, file)) != 1:
+        raise UserError("give exactly one of --length M, --rings SURVEY, --joints SURVEY and --file FILE")
     found = read_elements(file) if file is not None else []
     if zones and any(one.clock for one in found):
         raise UserError(f"{file} has clock positions: leave out --zones")
@@ -57,13 +66,13 @@ def add(
         place = get_design_tunnel(conn, get_tunnel(conn, tunnel), tunnel)
         if length is not None:
             found = stretches_of(length, place.start, place.end)
-        elif survey is not None:
-            there = get_survey(conn, survey)
+        elif (of := survey or joints) is not None:
+            there = get_survey(conn, of)
             if there.tunnel_id != place.tunnel_id:
-                raise UserError(f"survey {survey} is of tunnel {there.tunnel}, not of {tunnel}")
-            found = ring_elements(conn, there.id, survey)
+                raise UserError(f"survey {of} is of tunnel {there.tunnel}, not of {tunnel}")
+            found = (ring_elements if survey else joint_elements)(conn, there.id, of)
         found = zoned(found) if zones else found
-        source = "file" if file is not None else "length" if length is not None else "rings"
+        source = "file" if file is not None else "length" if length is not None else "rings" if survey else "joints"
         save_elements(conn, place.tunnel_id, tunnel, name, source, found)
     add_to_json(tunnel=tunnel, name=name, source=source, elements=len(found))
     notify(f"{name}: {counted(len(found), 'element')} of {tunnel}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime as dt
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, LiteralString
 
 import psycopg
@@ -24,6 +25,9 @@ MEASURES = {
     "growth": "m²/year",
 }
 """Measures of rules, with their units."""
+
+JOINT_WIDTH = 0.3
+"""Distance along the tunnel within which findings are parts of one transverse joint, m."""
 
 ZONES = {"crown": (10.0, 2.0), "right": (2.0, 5.0), "invert": (5.0, 7.0), "left": (7.0, 10.0)}
 """Zones of the circumference by clock position, clockwise looking up-chainage, hours."""
@@ -205,6 +209,41 @@ def ring_elements(conn: psycopg.Connection[Any], survey_id: int, survey: str) ->
     if not rows:
         raise UserError(f"survey {survey} has no rings: tunneldb rings {survey}")
     return [Element(f"ring {number}", low, high) for number, low, high in rows]
+
+
+def joint_elements(conn: psycopg.Connection[Any], survey_id: int, survey: str) -> list[Element]:
+    """Return the blocks between the transverse joints of a survey, from its beginning to its end.
+
+    A joint is transverse if its findings within :data:`JOINT_WIDTH` of each other span half of the circumference or more.
+
+    Raises
+    ------
+    UserError
+        If it has no such joint.
+    """
+    rows = conn.execute(
+        """
+        SELECT v.chainage_from, v.chainage_to, f.middle, f.span / (s.arc[361] - s.arc[1])
+          FROM tunnel_api.survey_ends(%(id)s) v
+         CROSS JOIN LATERAL (SELECT (a.chainage_from + a.chainage_to) / 2 AS middle, a.arc_to - a.arc_from AS span
+                               FROM tunnel_api.finding a WHERE a.survey_id = %(id)s AND a.kind = 'joint' AND a.counted) f
+         CROSS JOIN LATERAL (SELECT c.arc FROM tunnel.section c WHERE c.survey_id = %(id)s
+                              ORDER BY abs(c.chainage - f.middle) LIMIT 1) s
+         ORDER BY f.middle
+        """,
+        {"id": survey_id},
+    ).fetchall()
+    joints: list[list[tuple[float, float]]] = []
+    for _, _, middle, share in rows:
+        if joints and middle - joints[-1][-1][0] <= JOINT_WIDTH:
+            joints[-1].append((middle, share))
+        else:
+            joints.append([(middle, share)])
+    places = [sum(at for at, _ in joint) / len(joint) for joint in joints if sum(share for _, share in joint) >= 0.5]
+    if not places:
+        raise UserError(f"survey {survey} has no joint around half of the circumference: give --length, --rings or --file")
+    edges = [rows[0][0], *(place for place in places if rows[0][0] < place < rows[0][1]), rows[0][1]]
+    return [Element(f"block {n}", low, high) for n, (low, high) in enumerate(pairwise(edges), start=1)]
 
 
 def save_scheme(conn: psycopg.Connection[Any], scheme: Scheme) -> None:

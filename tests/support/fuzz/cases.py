@@ -90,6 +90,7 @@ OF_WORDS: tuple[str, ...] = (
     "rings --points {seeds}/rings-points.csv --axis {seeds}/rings-axis.csv --diameter 5.8 -o {out}.csv", "rings demo-2024",
     "sections demo-2024 --from 12+300 --to 12+310 --every 5 -o {out}.csv",
     "profile add demo {new} {seeds}/profile.csv {stretch}", "profile list demo", "profile remove demo {new}",
+    "elements add demo {new} --joints demo-2024",
     "elements add demo {new} --length 10", "elements list demo", "elements remove demo {new}", "rating list",
     "rating show example", "rating remove {new} 1", "rating apply demo-2024 --elements blocks --scheme example",
     "rating compare demo-2024 --elements blocks --scheme example --scheme example:1",

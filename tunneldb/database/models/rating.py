@@ -18,14 +18,14 @@ class ElementSet(Base):
     __table_args__ = (
         UniqueConstraint("tunnel_id", "name"),
         at_most("name", 100),
-        one_of("source", "file", "length", "rings"),
+        one_of("source", "file", "length", "rings", "joints"),
         {"comment": "Divisions of tunnels into elements that are rated: rings, blocks, stretches, zones"},
     )
 
     id: Mapped[int] = mapped_column(Identity(always=True), primary_key=True, comment="Key")
     tunnel_id: Mapped[int] = mapped_column(parent("tunnel"), comment=TUNNEL)
     name: Mapped[str] = mapped_column(comment="Name")
-    source: Mapped[str] = mapped_column(comment="file, length (equal stretches) or rings (of a survey)")
+    source: Mapped[str] = mapped_column(comment="file, length (equal stretches), rings or joints (of a survey)")
     added_at: Mapped[dt.datetime] = mapped_column(server_default=CLOCK, comment="Time when it was added")
 
 
