@@ -160,14 +160,16 @@ def test_rings_and_zones_become_elements(dsn: str, example: str, conn: psycopg.C
 
 def test_blocks_between_joints_become_elements(dsn: str, example: str, conn: psycopg.Connection) -> None:
     """One joint spans 14 m of 24 m; three pieces make another one; those of 12 m (of the example) and 4 m bound no block."""
-    add = "INSERT INTO tunnel_api.finding_unrolled (survey, kind, geom) VALUES (%s, 'joint', public.ST_MakeEnvelope(%s, %s, %s, %s))"
-    for low, high, arc_from, arc_to in (
-        (12380, 12380.1, -9, -4),
-        (12380.1, 12380.2, -4, 1),
-        (12380, 12380.1, 2, 6),
-        (12450, 12450.1, 0, 4),
-    ):
-        conn.execute(add, [NAME, low, arc_from, high, arc_to])
+    pieces = (
+        (12380, 12380.1, -9, -4), (12380.1, 12380.2, -4, 1), (12380, 12380.1, 2, 6), (12450, 12450.1, -8, 6),
+        (12470, 12470.1, 0, 4),
+    )  # fmt: skip
+    for low, high, arc_from, arc_to in pieces:
+        conn.execute(
+            "INSERT INTO tunnel_api.finding_unrolled (survey, kind, geom)"
+            " VALUES (%s, 'joint', public.ST_MakeEnvelope(%s, %s, %s, %s))",
+            [NAME, low, arc_from, high, arc_to],
+        )
     conn.commit()
     done("elements", "add", "demo", "between", "--joints", NAME)
     rows = conn.execute(
