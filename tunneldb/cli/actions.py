@@ -249,7 +249,7 @@ def _subject(row: dict[str, Any]) -> str:
 
 
 def _read(settings: Settings, tunnel: str, states: tuple[str, ...], overdue: bool, survey: str | None) -> list[dict[str, Any]]:
-    from tunneldb.store.actions import list_actions
+    from tunneldb.store.actions import list_actions, outdated_comparisons
     from tunneldb.store.catalog import get_tunnel
     from tunneldb.store.survey import get_survey
 
@@ -257,4 +257,6 @@ def _read(settings: Settings, tunnel: str, states: tuple[str, ...], overdue: boo
         tunnel_id = get_tunnel(conn, tunnel)
         if survey is not None and get_survey(conn, survey).tunnel_id != tunnel_id:
             raise UserError(f"survey {survey} is not of tunnel {tunnel}")
+        for older, newer, reason in outdated_comparisons(conn, tunnel_id):
+            notify(f"follow-ups in {newer} are outdated ({reason}): tunneldb compare {older} {newer}")
         return list_actions(conn, tunnel_id, states, overdue, survey)
