@@ -21,7 +21,7 @@ TOPICS = {
     "Design profile": ("deviation", "deviation_layer", "thickness", "evenness"),
     "Clearance": ("clearance", "clearance_layer"),
     "Rings": ("rings",),
-    "Elements and ratings": ("rating",),
+    "Elements and ratings": ("rating", "rating_layer"),
     "Actions": ("action",),
     "Alarms": ("alarms",),
     "Structures": ("structures",),

@@ -38,7 +38,7 @@ LANGUAGE sql STABLE STRICT PARALLEL SAFE SECURITY DEFINER SET search_path = pg_c
                          WHERE l.back = 1 AND l.state = 'unseen' AND EXISTS (SELECT FROM last)), '')
 $$;
 COMMENT ON FUNCTION tunnel_internal.follow_up(int, bigint) IS
-'What became of a leak in later surveys, from their comparisons (tunneldb compare): dry since a date, grown, same or shrunk with areas (m²); not inspected; not compared';
+'State of a leak in later surveys, from their comparisons (tunneldb compare): dry since a date, grown, same or shrunk with areas (m²); not inspected; not compared';
 
 CREATE OR REPLACE VIEW tunnel_api.action AS
 SELECT a.id, a.survey_id, s.name AS survey, s.tunnel_id, t.name AS tunnel, a.finding_id,
@@ -92,7 +92,7 @@ BEGIN
         ('state', 'open, ordered, done or verified'),
         ('remark', 'Remark'),
         ('photos', 'Number of photos of the finding (finding_photo)'),
-        ('follow_up', 'What became of the leak in later surveys that were compared with this one: dry since a date, grown, same, shrunk, not inspected or not compared; NULL without a finding'),
+        ('follow_up', 'State of the leak in later surveys that were compared with this one: dry since a date, grown, same, shrunk, not inspected or not compared; NULL without a finding'),
         ('added_by', 'Role that added it, set by the database'),
         ('added_at', 'Time when it was added, set by the database'),
         ('changed_by', 'Role that changed it last, set by the database'),

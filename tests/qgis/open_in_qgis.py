@@ -1,7 +1,8 @@
 """Open a project with real QGIS and say what it sees, as JSON; runs under the Python that has PyQGIS.
 
 Usage: open_in_qgis.py PROJECT describe | render THEME PNG | move_vertex N DX DZ | review ID STATUS REMARK [LAYER [KIND]]
-       | draw KIND | draw_findings | add VIEW | draw_layer LAYER XMIN,YMIN,XMAX,YMAX PNG | numbers LAYER
+       | draw KIND | draw_findings | write_action | results LAYER | add VIEW
+       | draw_layer LAYER XMIN,YMIN,XMAX,YMAX PNG | numbers LAYER
        | atlas PDF [LAYOUT] | preview | where CHAINAGE ARC | labels LAYER | space [PNG]
 """
 
@@ -49,7 +50,7 @@ from qgis.core import (
     QgsWkbTypes,
 )
 from qgis.gui import QgsMapCanvas
-from qgis.PyQt.QtCore import QSize
+from qgis.PyQt.QtCore import QDate, QSize
 from qgis.PyQt.QtGui import QColor, QOpenGLContext, QSurfaceFormat
 from qgis.PyQt.QtXml import QDomDocument
 
@@ -326,6 +327,49 @@ def draw_findings(project: QgsProject) -> dict[str, Any]:
         features = project.mapLayer(PREFIX + layer_id).getFeatures()
         seen["shapes"] = sorted({QgsWkbTypes.displayString(feature.geometry().wkbType()) for feature in features})
     return done
+
+
+def write_action(project: QgsProject) -> dict[str, Any]:
+    """Draw an action on the lining with the values that the form begins with, and order it, as the form does."""
+    layer = project.mapLayer(PREFIX + "action_unrolled")
+    column = layer.fields().indexOf
+    assert layer.startEditing(), "cannot be edited"
+    feature = QgsVectorLayerUtils.createFeature(
+        layer, QgsGeometry.fromPointXY(QgsPointXY(12360.1234, 1.5)), {column("measure"): "inject the joint"}
+    )
+    assert layer.addFeature(feature)
+    added = _commit(layer)
+    (stored,) = [one for one in layer.getFeatures() if one["measure"] == "inject the joint"]
+    assert layer.startEditing()
+    for name, value in (("state", "ordered"), ("due", QDate(2021, 3, 31)), ("cost", 1200.5), ("currency", "EUR")):
+        assert layer.changeAttributeValue(stored.id(), column(name), value), name
+    changed = _commit(layer)
+    choices = {
+        name: [value for one in layer.editorWidgetSetup(column(name)).config()["map"] for value in one.values()]
+        for name in ("urgency", "state")
+    }
+    return {"added": added, "changed": changed, "choices": choices, "due": layer.editorWidgetSetup(column("due")).type()}
+
+
+def results(project: QgsProject, layer_id: str) -> dict[str, Any]:
+    """Each element with the labels of the legend under which it is drawn, and its label."""
+    layer = project.mapLayer(PREFIX + layer_id)
+    context = QgsRenderContext()
+    context.expressionContext().appendScopes(QgsExpressionContextUtils.globalProjectLayerScopes(layer))
+    renderer = layer.renderer().clone()
+    renderer.startRender(context, layer.fields())
+    labels = {item.ruleKey(): item.label() for item in renderer.legendSymbolItems()}
+    text = QgsExpression(layer.labeling().settings().fieldName)
+    found = {}
+    for feature in layer.getFeatures():
+        context.expressionContext().setFeature(feature)
+        keys = renderer.legendKeysForFeature(feature, context)
+        found[feature["name"]] = [
+            sorted(labels[key] for key in keys if labels.get(key)),
+            text.evaluate(context.expressionContext()),
+        ]
+    renderer.stopRender(context)
+    return {"elements": found, "legend": list(labels.values()), "title": layer.name()}
 
 
 def add(project: QgsProject, view: str) -> dict[str, Any]:

@@ -47,6 +47,7 @@ ON_MAP = {
     "clearance_infringement_3d": "MultiPointZ",
     "detectability_map": "Polygon",
     "ring_map": "Polygon",
+    "action_map": "Point",
     "deviation_map": "LineString",
 }
 IMAGES = ("raw", "corrected", "corrected-filled", "offset", "state", "class")
@@ -55,7 +56,7 @@ UNROLLED = {
     "sheet": "Polygon", "leak_sheet": "Polygon", "coverage_gap": "Polygon", "dark_band": "Polygon", "detectability": "Polygon",
     "clearance_unrolled": "Polygon",
     "clearance_infringement_unrolled": "MultiPolygon",
-    "ring_unrolled": "Polygon", "deviation_bar": "Polygon", "evenness_area": "Polygon",
+    "action_unrolled": "Point", "ring_unrolled": "Polygon", "deviation_bar": "Polygon", "evenness_area": "Polygon",
 }  # fmt: skip
 NOT_AT_FIRST = {"dark_unrolled", "detectability", "leak_sheet", "ring_unrolled", "deviation_bar", "evenness_area"}
 """Layers of the unrolled plane that its theme does not show."""
@@ -206,7 +207,7 @@ def test_themes_and_views(seen: dict[str, Any]) -> None:
         "coverage_gap", "dark_band", "leak_sheet", *ON_SHEETS, "demo-2024-km012-corrected", "demo-2024-km012-corrected-filled",
     }  # fmt: skip
     assert set(seen["themes"]["Map"]) == {
-        "axis", "axis_vertex", "segment", "section", "leak_map", "target_sphere", "cluster", "outline",
+        "action_map", "axis", "axis_vertex", "segment", "section", "leak_map", "target_sphere", "cluster", "outline",
         "clearance_map", "clearance_infringement_3d",
     }  # fmt: skip
     assert set(seen["themes"]["3D"]) == {
@@ -648,6 +649,7 @@ def test_inspector_edits_and_what_is_stale_can_be_recomputed(conn: psycopg.Conne
     "view",
     [
         "leak_map", "leak_3d", "leak_unrolled", "axis_vertex", "segment", "section", "target_sphere", "cluster", "ground",
+        "action_unrolled",
     ],
 )  # fmt: skip
 def test_layer_added_by_hand_finds_its_style_srid_and_height(shared: Path, view: str) -> None:
@@ -675,7 +677,7 @@ def test_styles_have_one_default_a_layer_and_are_replaced(conn: psycopg.Connecti
         *((name, "geom") for name in STYLED), ("leak", "unrolled"), ("leak", "map"), ("leak", "surface"),
         ("spot", "map"), ("spot", "surface"),
         *((layer.view, "geom") for layer in (*SCANNER_LAYERS, *STRUCTURE_LAYERS, *UNDERWATER_LAYERS, *CHANGE_LAYERS)),
-        ("spot_face", "geom"),
+        ("spot_face", "geom"), ("rating_map", "geom"), ("rating_unrolled", "geom"),
     }  # fmt: skip
     assert all(row[2:] == (1, 1, True) for row in first)
     conn.execute(

@@ -324,3 +324,39 @@ def test_two_schemes_are_compared_by_place_in_their_scale(conn: psycopg.Connecti
         assert row["other_result"] == ("D" if fact["leaks"] else "A")
         expected = ("ABCD".index(row["other_result"]) - "ABCD".index(row["result"])) / 3
         assert row["difference"] == pytest.approx(expected)
+
+
+LAYER = "survey = %s AND element_set = %s AND scheme = 'example' AND version = '1'"
+
+
+@pytest.mark.parametrize("view", ["rating_unrolled", "rating_map"])
+@pytest.mark.parametrize("element_set", ["blocks", "zones"])
+def test_the_layers_state_the_rating(conn: psycopg.Connection, example: str, view: str, element_set: str) -> None:
+    """Rows as of the function; the outlines of all elements cover the lining once, on the map strip too."""
+    rows = ask(conn, f"SELECT * FROM tunnel_api.{view} WHERE {LAYER} ORDER BY number", [NAME, element_set])
+    known = ask(conn, "SELECT * FROM tunnel_api.rating(%s, %s, 'example', '1') ORDER BY number", [NAME, element_set])
+    shared = set(known[0]) & set(rows[0])
+    assert len(shared) > 12
+    assert [{name: row[name] for name in shared} for row in rows] == [{name: row[name] for name in shared} for row in known]
+    for row in rows:
+        words = "not rated" if row["result"] is None else row["result"] if row["complete"] else f"at least {row['result']}"
+        assert (row["result_text"], row["levels"]) == (words, 4)
+    (row,) = ask(
+        conn,
+        "SELECT sum(public.ST_Area(geom)) AS area, public.ST_Area(public.ST_Union(geom)) AS joined,"
+        f" bool_and(public.ST_IsValid(geom)) AS valid FROM tunnel_api.{view} WHERE {LAYER}",
+        [NAME, element_set],
+    )
+    (girth,) = conn.execute(
+        "SELECT avg(arc_to - arc_from) FROM tunnel_api.section_unrolled WHERE survey = %s", [NAME]
+    ).fetchone()  # type: ignore[misc]
+    assert row["valid"]
+    assert row["area"] == pytest.approx(row["joined"], rel=1e-3)
+    assert row["area"] == pytest.approx(200 * girth, rel=0.01)
+
+
+def test_a_layer_computes_one_rating(conn: psycopg.Connection, example: str) -> None:
+    plan = conn.execute(f"EXPLAIN (ANALYZE, TIMING off) SELECT * FROM tunnel_api.rating_map WHERE {LAYER}", [NAME, "blocks"])
+    calls = [line for (line,) in plan if "Function Scan on rating " in line]
+    assert len(calls) == 1
+    assert "loops=1)" in calls[0]

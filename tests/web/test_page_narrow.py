@@ -12,7 +12,7 @@ from support.example_survey import LEAKS, NAME
 
 PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
 
-TABS = ["Finding", "Review", "Draw", "Section", "Download", "Notes"]
+TABS = ["Finding", "Review", "Draw", "Section", "Rating", "Actions", "Download", "Notes"]
 
 
 @pytest.fixture(scope="module")

@@ -23,6 +23,9 @@ WRITES = [
     ("POST", "/api/findings/merge", {"ids": [1, 2]}),
     ("DELETE", "/api/findings/1", None),
     ("POST", "/api/surveys/demo-2024/findings", DRAWING | NOTHING),
+    ("POST", "/api/surveys/demo-2024/actions", {"finding_id": 1, "measure": "seal"}),
+    ("PATCH", "/api/actions/1", {"seen": {"state": "open"}, "values": {"state": "done"}}),
+    ("DELETE", "/api/actions/1", None),
 ]  # fmt: skip
 
 
@@ -56,6 +59,9 @@ PATHS = [
     "/collections/finding_map/items?limit=-1",
     "/api/findings/" + "9" * 4400, "/api/surveys?" + "&".join(f"a{n}=1" for n in range(4000)),
     "/tileMatrixSets/other", "/tiles/demo-2024/secret",
+    "/api/surveys/demo-2024/rating", "/api/surveys/demo-2024/rating?elements=blocks&scheme=nothing",
+    "/api/surveys/demo-2024/rating?elements=nothing&scheme=example", "/api/surveys/nothing/actions",
+    "/api/surveys/demo-2024/rating/change?elements=blocks&scheme=example&version=9",
 ]  # fmt: skip
 
 

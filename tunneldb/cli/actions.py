@@ -13,6 +13,7 @@ from tunneldb.cli.main import Settings
 from tunneldb.cli.measure import output_option, require_ending, say_written
 from tunneldb.cli.output import CommandGroup, add_to_json, notify
 from tunneldb.cli.param_types import FilePath
+from tunneldb.cli.past import as_of_option, connect_as_of
 from tunneldb.cli.stretch import parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table
 from tunneldb.counted import counted
@@ -94,13 +95,19 @@ def actions() -> None:
     "--state", "states", type=click.Choice(STATES), multiple=True, help="Only actions in this state. Can be repeated."
 )
 @click.option("--overdue", is_flag=True, help="Only actions that are open or ordered after their due date.")
+@as_of_option
 @click.pass_obj
-def list_(settings: Settings, tunnel: str, survey: str | None, states: tuple[str, ...], overdue: bool) -> None:
+def list_(
+    settings: Settings, tunnel: str, survey: str | None, states: tuple[str, ...], overdue: bool, moment: dt.datetime | None
+) -> None:
     """List the actions of TUNNEL by due date, with the state of each leak in later surveys.
 
-    A later survey is included if it was compared with the survey of the action (tunneldb compare).
+    A later survey is included if it was compared with the survey of the action (tunneldb compare). --as-of needs
+    --survey.
     """
-    rows = _read(settings, tunnel, states, overdue, survey)
+    if moment is not None and survey is None:
+        raise UserError("--as-of needs --survey SURVEY: the past is shown of one survey")
+    rows = _read(settings, tunnel, states, overdue, survey, moment)
     add_to_json(tunnel=tunnel, actions=rows)
     print_table(
         ["id", "place", "subject", "measure", "urgency", "responsible", "due", "cost", "state", "follow-up"],
@@ -248,15 +255,23 @@ def _subject(row: dict[str, Any]) -> str:
     return f"element {row['element']}" if row["element"] else ""
 
 
-def _read(settings: Settings, tunnel: str, states: tuple[str, ...], overdue: bool, survey: str | None) -> list[dict[str, Any]]:
+def _read(
+    settings: Settings,
+    tunnel: str,
+    states: tuple[str, ...],
+    overdue: bool,
+    survey: str | None,
+    moment: dt.datetime | None = None,
+) -> list[dict[str, Any]]:
     from tunneldb.store.actions import list_actions, outdated_comparisons
     from tunneldb.store.catalog import get_tunnel
     from tunneldb.store.survey import get_survey
 
-    with connect(settings.dsn) as conn:
+    with connect_as_of(settings.dsn, survey or "", moment) as conn:
         tunnel_id = get_tunnel(conn, tunnel)
         if survey is not None and get_survey(conn, survey).tunnel_id != tunnel_id:
             raise UserError(f"survey {survey} is not of tunnel {tunnel}")
-        for older, newer, reason in outdated_comparisons(conn, tunnel_id):
+        outdated = [] if moment is not None else outdated_comparisons(conn, tunnel_id)
+        for older, newer, reason in (one for one in outdated if survey in (None, one[0])):
             notify(f"follow-ups in {newer} are outdated ({reason}): tunneldb compare {older} {newer}")
         return list_actions(conn, tunnel_id, states, overdue, survey)

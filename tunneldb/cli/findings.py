@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 from collections.abc import Sequence
 from pathlib import Path
 from typing import cast, get_args
@@ -14,6 +15,7 @@ from tunneldb.cli.leaks import parse_clock
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import CommandGroup, add_to_json, notify, printable, records
 from tunneldb.cli.param_types import FilePath, FiniteRange, WholeRange
+from tunneldb.cli.past import as_of_option, connect_as_of
 from tunneldb.cli.stretch import parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table, table_format
 from tunneldb.counted import counted
@@ -95,6 +97,7 @@ def findings() -> None:
 @click.option("--scheme", metavar="NAME", help="Rating scheme, the version added last; with --elements, for a workbook.")
 @click.option("--elements", "element_set", metavar="NAME", help="Division of the tunnel to rate (tunneldb elements).")
 @click.option("--count", is_flag=True, help="Number of each kind and origin instead, by state.")
+@as_of_option
 @click.pass_context
 def list_findings(
     context: click.Context,
@@ -113,6 +116,7 @@ def list_findings(
     scheme: str | None,
     element_set: str | None,
     count: bool,
+    moment: dt.datetime | None,
 ) -> None:
     """List the findings of SURVEY, detected and drawn, or write them to a file.
 
@@ -146,7 +150,7 @@ def list_findings(
     if (scheme is None) != (element_set is None) or (scheme is not None and form != "xlsx"):
         raise UserError("--scheme and --elements go together, and need a workbook: -o findings.xlsx")
     hours = parse_clock(clock) if clock else None
-    with connect(settings.dsn) as conn:
+    with connect_as_of(settings.dsn, survey, moment) as conn:
         found = get_survey(conn, survey)
         require_finding_kinds(conn, kinds)
         stretch = parse_stretch(conn, found, start, end)

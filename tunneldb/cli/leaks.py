@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import re
 from collections.abc import Sequence
 from io import StringIO
@@ -16,9 +17,9 @@ from tunneldb.cli.coverage import say_coverage, say_no_crs, say_remarks
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import add_to_json, command, notify, records
 from tunneldb.cli.param_types import FilePath, FiniteRange
+from tunneldb.cli.past import as_of_option, connect_as_of
 from tunneldb.cli.stretch import parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table, table_format
-from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.export.tables.leak_files import as_csv, as_geojson, as_record, write_gpkg
 from tunneldb.export.tables.leaks import as_table
@@ -86,6 +87,7 @@ _CLOCK = re.compile(rf"{_HOUR}-{_HOUR}")
     help="Least confidence, 0 to 1; excludes leaks without a confidence.",
 )
 @click.option("--by-km", is_flag=True, help="Sums of each kilometre instead, with its class of waterproofing.")
+@as_of_option
 @click.pass_context
 def leaks(
     context: click.Context,
@@ -101,6 +103,7 @@ def leaks(
     min_area: float,
     min_confidence: float,
     by_km: bool,
+    moment: dt.datetime | None,
 ) -> None:
     """List the leaks of SURVEY, or other dark areas of its lining, or export them.
 
@@ -128,7 +131,7 @@ def leaks(
     if by_km and (output is not None or form != "table" or kind != "leak" or filtered):
         raise UserError("--by-km prints a table of all leaks; elsewhere read the view tunnel_api.km_waterproof")
     hours = parse_clock(clock) if clock else None
-    with connect(settings.dsn) as conn:
+    with connect_as_of(settings.dsn, survey, moment) as conn:
         found = get_survey(conn, survey)
         if found.note:
             add_to_json(note=found.note)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import math
 import os
 from pathlib import Path
@@ -43,6 +44,37 @@ class FilePath(click.Path):
 def file_path(text: str) -> Path:
     """Path of a file that is given where something else may be, too; refused as `FilePath` refuses it."""
     return Path(os.fsdecode(FilePath().convert(text, None, None)))
+
+
+class Moment(click.ParamType[dt.datetime]):
+    """A past moment in local time, ``2026-03-31T12:00``; of a day, ``2026-03-31``, its end."""
+
+    name = "moment"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> dt.datetime:
+        """Return the moment with its time zone."""
+        option = param.opts[0] if param else "moment"
+        now = dt.datetime.now(dt.UTC)
+        try:
+            if len(value) == len("2026-03-31"):
+                day = dt.date.fromisoformat(value)
+                return (
+                    now
+                    if day == now.astimezone().date()
+                    else self._past(option, value, dt.datetime.combine(day, dt.time.max), now)
+                )
+            return self._past(option, value, dt.datetime.fromisoformat(value), now)
+        except ValueError:
+            raise UserError(f"{option} {value}: write a day as 2026-03-31, or a moment as 2026-03-31T12:00") from None
+
+    def _past(self, option: str, value: str, moment: dt.datetime, now: dt.datetime) -> dt.datetime:
+        try:
+            found = moment.astimezone(dt.UTC)
+        except OverflowError:
+            raise UserError(f"{option} {value}: that is not a day that can be meant") from None
+        if found > now:
+            raise UserError(f"{option} {value} is in the future")
+        return found
 
 
 def _plain(value: Any) -> Any:

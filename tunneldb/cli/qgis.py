@@ -18,9 +18,10 @@ from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.export.images.change import export_change
 from tunneldb.export.images.image import export_filled, export_kilometre, image_kilometres
-from tunneldb.export.qgis import store_project, store_styles, write_project
+from tunneldb.export.qgis import Rating, store_project, store_styles, write_project
 from tunneldb.files import exit_on_sigterm, made_folder
 from tunneldb.store.coverage import read_coverage
+from tunneldb.store.rating import list_elements, scheme_rules
 from tunneldb.store.remarks import read_remarks
 from tunneldb.store.spots import read_spots
 from tunneldb.store.survey import Survey, get_survey
@@ -31,6 +32,7 @@ from tunneldb.store.survey import Survey, get_survey
         "tunneldb qgis demo-2024 -o demo.qgz",
         "tunneldb qgis demo-2024 --database --images /srv/tunnels/demo-2024",
         "tunneldb qgis demo-2024 -o demo.qgz --database demo --service tunnels",
+        "tunneldb qgis demo-2024 -o demo.qgz --elements blocks --scheme example",
     ]
 )
 @click.argument("survey")
@@ -48,9 +50,20 @@ from tunneldb.store.survey import Survey, get_survey
     help="Folder of the images that all users can reach; default: FILE-images, or SURVEY-images here.",
 )  # fmt: skip
 @click.option("--service", metavar="NAME", help="Entry of pg_service.conf by which the project connects (never a password).")
+@click.option("--elements", metavar="NAME", help="Elements whose rating the project shows (tunneldb elements list).")
+@click.option("--scheme", metavar="NAME", help="Scheme by which they are rated (tunneldb rating list).")
+@click.option("--scheme-version", metavar="VERSION", help="Version of the scheme; default: the one added last.")
 @click.pass_obj
 def qgis(
-    settings: Settings, survey: str, output: Path | None, name: str | None, folder: Path | None, service: str | None
+    settings: Settings,
+    survey: str,
+    output: Path | None,
+    name: str | None,
+    folder: Path | None,
+    service: str | None,
+    elements: str | None,
+    scheme: str | None,
+    scheme_version: str | None,
 ) -> None:
     """Write a QGIS project of SURVEY: map, unrolled lining, 3D and inspection sheets, with styled layers.
 
@@ -61,6 +74,9 @@ def qgis(
     gaps up to 0.6 m filled below it. For a survey compared with an older one it shows the changes. Styles are also
     stored in the database for layers that are added by hand. A project in the database refers to the images by
     absolute paths.
+
+    With --elements and --scheme it shows the rating of the elements, as it is when the map is drawn: green to red,
+    hatched for a lower bound, grey where nothing was inspected. Actions of the tunnel can be added and changed in it.
     """
     if output is None and name is None:
         raise UserError("say where the project goes: -o FILE.qgz, or --database")
@@ -72,14 +88,15 @@ def qgis(
         found = get_survey(conn, survey, site=True)
         coverage = None if found.site else read_coverage(conn, found)
         spots, remarks = read_spots(conn, found), read_remarks(conn, found)
+        rating = _rating(conn, found, elements, scheme, scheme_version)
         beside = Path(f"{found.name}-images") if output is None else output.with_name(f"{output.stem}-images")
         images = [] if found.site else _export_images(conn, found, folder or beside)
         written = []
         if output is not None:
-            write_project(conn, found, output, images, service)
+            write_project(conn, found, output, images, service, rating)
             written.append(str(output))
         if name is not None:
-            store_project(conn, found, name or found.name, images, service)
+            store_project(conn, found, name or found.name, images, service, rating)
             written.append(f"project {name or found.name} in public.qgis_projects")
         styles = _store_styles(conn)
         socket = conn.info.host.startswith("/")
@@ -94,6 +111,26 @@ def qgis(
         notify("the project works while the database runs; after a restart of the machine: tunneldb server start")
     if name is not None and socket:
         notify("QGIS finds projects behind a socket only by an entry of pg_service.conf: docs/howto-qgis.md")
+
+
+def _rating(
+    conn: psycopg.Connection, survey: Survey, elements: str | None, scheme: str | None, version: str | None
+) -> Rating | None:
+    """Return the rating that the project shows, if any.
+
+    Raises
+    ------
+    UserError
+        If only one of elements and scheme is given, or one does not exist.
+    """
+    if elements is None and scheme is None and version is None:
+        return None
+    if elements is None or scheme is None:
+        raise UserError("a rating needs both --elements NAME and --scheme NAME")
+    chosen, _ = scheme_rules(conn, scheme, version)
+    if all(one["element_set"] != elements for one in list_elements(conn, survey.tunnel_id)):
+        raise UserError(f"tunnel {survey.tunnel} has no elements named {elements!r}: tunneldb elements list {survey.tunnel}")
+    return Rating(elements, chosen["name"], chosen["version"], tuple(chosen["results"]))
 
 
 def _export_images(conn: psycopg.Connection, survey: Survey, folder: Path) -> list[Path]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
@@ -13,6 +14,7 @@ from tunneldb.cli.main import Settings
 from tunneldb.cli.measure import number, output_option, require_ending, say_written, write_rows
 from tunneldb.cli.output import CommandGroup, add_to_json, notify
 from tunneldb.cli.param_types import FilePath
+from tunneldb.cli.past import as_of_option, connect_as_of
 from tunneldb.cli.tables import print_table
 from tunneldb.counted import counted
 from tunneldb.database import connect
@@ -145,8 +147,17 @@ def remove(settings: Settings, scheme: str, version: str) -> None:
 @click.option("--scheme", required=True, metavar="NAME", help="Rating scheme.")
 @click.option("--version", metavar="VERSION", help="Version of the scheme. [default: the one added last]")
 @output_option("File to write: .csv or .xlsx.")
+@as_of_option
 @click.pass_obj
-def apply(settings: Settings, survey: str, element_set: str, scheme: str, version: str | None, output: Path | None) -> None:
+def apply(
+    settings: Settings,
+    survey: str,
+    element_set: str,
+    scheme: str,
+    version: str | None,
+    output: Path | None,
+    moment: dt.datetime | None,
+) -> None:
     """Rate the elements of SURVEY.
 
     The worst result of all rules is that of the element. If less than the scheme's minimum was inspected, the result
@@ -157,7 +168,7 @@ def apply(settings: Settings, survey: str, element_set: str, scheme: str, versio
     from tunneldb.store.survey import get_survey
 
     require_ending(output, "the rating", (".csv", ".xlsx"))
-    with connect(settings.dsn) as conn:
+    with connect_as_of(settings.dsn, survey, moment) as conn:
         get_survey(conn, survey)
         found, _ = scheme_rules(conn, scheme, version)
         rows = rate(conn, survey, element_set, found["name"], found["version"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,6 +14,7 @@ from tunneldb.cli.coverage import say_coverage
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import add_to_json, command, notify, printable
 from tunneldb.cli.param_types import FilePath, WholeRange
+from tunneldb.cli.past import as_of_option
 from tunneldb.cli.progress import bar
 from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
 from tunneldb.counted import counted
@@ -25,6 +27,7 @@ from tunneldb.report.page import MAX_LISTED_LEAKS, Written, write_html, write_si
 from tunneldb.report.pdf import find_browser, print_pdf
 from tunneldb.report.pictures.addresses import parse_server
 from tunneldb.report.pictures.load import Source
+from tunneldb.report.record import append_to_pdf, read_record, verify
 from tunneldb.store.coverage import read_coverage
 from tunneldb.store.survey import Survey, get_survey
 
@@ -56,13 +59,19 @@ PHOTO_SERVER = _PhotoServer()
         "tunneldb report demo-2024 -o report.html",
         "tunneldb report demo-2024 -o part.pdf --from 12+300 --to 12+350",
         "tunneldb report demo-2024 -o bericht.pdf --template owner.toml --photos photos",
-    ]
+        "tunneldb report demo-2024 -o then.html --as-of 2026-03-31",
+        "tunneldb report --verify report.pdf",
+    ],
+    codes={
+        "3": "--verify: the report is genuine, and the database changed since",
+        "4": "--verify: the database never had what the report states: the file or the database was altered",
+        "5": "--verify: the database changed since, and its state at that time is not stored",
+    },
 )
-@click.argument("survey")
+@click.argument("survey", required=False)
 @click.option(
-    "-o", "--output", required=True, type=FilePath(dir_okay=False),
-    help="File to write: .html, or .pdf, which needs Chromium or Chrome.",
-)  # fmt: skip
+    "-o", "--output", type=FilePath(dir_okay=False), help="File to write: .html, or .pdf, which needs Chromium or Chrome."
+)
 @stretch_options
 @click.option(
     "--template",
@@ -93,17 +102,24 @@ PHOTO_SERVER = _PhotoServer()
     metavar="N",
     help="Most leaks to list and draw, the largest, rejected ones last. Sums include all.",
 )
-@click.pass_obj
+@as_of_option
+@click.option(
+    "--verify", "signed", type=FilePath(dir_okay=False), metavar="FILE",
+    help="Compare the digest of a report, .html or .pdf, with the database; write nothing.",
+)  # fmt: skip
+@click.pass_context
 def report(
-    settings: Settings,
-    survey: str,
-    output: Path,
+    ctx: click.Context,
+    survey: str | None,
+    output: Path | None,
     start: str | None,
     end: str | None,
     template: Path | None,
     photos: Path | None,
     servers: tuple[str, ...],
     listed: int,
+    moment: dt.datetime | None,
+    signed: Path | None,
 ) -> None:
     """Write the inspection report of SURVEY for signature.
 
@@ -117,7 +133,17 @@ def report(
     The HTML file needs no network. Its table of leaks can be sorted and searched, and it prints on A4. The PDF is its
     print, with pictures of the 400 largest leaks. It is printed by the program in TUNNELDB_BROWSER, or by Chromium or
     Chrome.
+
+    With --as-of, reviews, drawings, photos, dry regions and actions are those of the moment. This is refused if a stage
+    ran since, because its earlier results are not stored.
     """
+    settings: Settings = ctx.obj
+    if signed is not None:
+        if survey is not None or output is not None or moment is not None:
+            raise UserError("--verify FILE is given alone: the file names its survey and moment")
+        ctx.exit(_verify(settings, signed))
+    if survey is None or output is None:
+        raise UserError(f"{'SURVEY' if survey is None else '--output FILE'} is missing: tunneldb report SURVEY -o report.html")
     suffix = output.suffix.lower()
     if suffix not in (".html", ".htm", ".pdf"):
         raise UserError(f"{output}: a report ends in .html or .pdf")
@@ -130,6 +156,8 @@ def report(
         found = get_survey(conn, survey, site=True)
         if found.site:
             conn.rollback()
+            if moment is not None:
+                raise UserError(f"survey {survey} is of a site: its report is written as of now")
             _write_site(conn, found, output, browser, start or end, owner)
             return
         stretch = parse_stretch(conn, found, start, end)
@@ -137,13 +165,14 @@ def report(
         conn.rollback()
         with exit_on_sigterm(), replacing(output) as temporary, bar("strips") as shown:
             if browser is None:
-                written = _write(conn, found, stretch, temporary, shown, owner, source, listed, paper=False)
+                written = _write(conn, found, stretch, temporary, shown, owner, source, listed, moment, paper=False)
             else:
                 with tempfile.TemporaryDirectory(prefix="tunneldb-report-") as folder:
                     page = Path(folder) / "report.html"
-                    written = _write(conn, found, stretch, page, shown, owner, source, listed, paper=True)
+                    written = _write(conn, found, stretch, page, shown, owner, source, listed, moment, paper=True)
                     conn.close()  # a browser may take minutes
                     _print(browser, page, temporary, shown)
+                    append_to_pdf(page, temporary)
     leaks, missing = written.leaks, [photo.photo.path for photo in written.missing]
     add_to_json(survey=survey, file=output, leaks=leaks, findings=written.findings, bytes=output.stat().st_size)
     add_to_json(missing_photos=missing)
@@ -184,6 +213,7 @@ def _write(
     owner: Owner,
     photos: Source,
     listed: int,
+    moment: dt.datetime | None,
     *,
     paper: bool,
 ) -> Written:
@@ -193,8 +223,33 @@ def _write(
         conn, survey, page, stretch.low, stretch.high,
         progress=lambda done, count: shown.update(task, completed=done, total=count),
         pictures=CARDS if paper else None, form="JPEG" if paper else "WEBP", owner=owner, photos=photos,
-        listed=listed,
+        listed=listed, moment=moment,
     )  # fmt: skip
+
+
+def _verify(settings: Settings, signed: Path) -> int:
+    """Compare a report with the database, print the result, and return the exit code."""
+    record = read_record(signed)
+    with connect(settings.dsn) as conn:
+        found = verify(conn, record)
+    edits = [{"who": who, "view": view, "edits": count} for (who, view), count in found.edits.items()]
+    add_to_json(survey=record.survey, file=signed, at=record.at, digest=record.digest, digest_now=found.now)
+    add_to_json(unchanged=found.unchanged, genuine=found.genuine, edits=edits)
+    notify(f"{signed}: survey {record.survey} as of {record.at.astimezone():%Y-%m-%d %H:%M:%S %z}, digest {record.digest}")
+    if found.unchanged:
+        notify("unchanged: the database has what the report states")
+        return 0
+    for (who, view), count in found.edits.items():
+        notify(f"changed since: {counted(count, 'edit')} of {view} by {who}")
+    if found.genuine is None:
+        notify(f"changed since, and not verified: {found.reason}")
+        return 5
+    notify(
+        f"changed since: the digest is {found.now} now; the report states what the database had then"
+        if found.genuine
+        else f"not genuine: the database had digest {found.then} then; the file or the database was altered"
+    )
+    return 3 if found.genuine else 4
 
 
 def _print(browser: str, page: Path, pdf: Path, shown: Progress) -> None:

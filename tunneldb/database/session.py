@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, LiteralString
@@ -10,6 +11,7 @@ import psycopg
 
 from tunneldb.database.connection import open_connection, prepare_session, resolve_dsn
 from tunneldb.database.schema import require_current_schema
+from tunneldb.errors import UserError
 from tunneldb.threads import threads
 
 APPLICATION = "tunneldb worker"
@@ -75,6 +77,35 @@ def connect(dsn: str | None) -> psycopg.Connection[Any]:
         connection.close()
         raise
     return connection
+
+
+@contextmanager
+def as_of(connection: psycopg.Connection[Any], survey: str, moment: dt.datetime | None = None) -> Iterator[dt.datetime]:
+    """Read the database as of one moment within a with block; with a moment, this survey as it was then.
+
+    The connection must be idle. Yields the moment that is read.
+
+    Raises
+    ------
+    UserError
+        If the survey cannot be shown as it was: it is younger, or a stage ran since; or the role is not an inspector's.
+    """
+    if moment is None:
+        with snapshot(connection):
+            row = connection.execute("SELECT clock_timestamp()").fetchone()
+            assert row is not None
+            yield row[0]
+        return
+    with connection.transaction(force_rollback=True):
+        connection.execute("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ")
+        try:
+            connection.execute("SELECT tunnel_api.show_as_of(%s, %s)", [survey, moment])
+        except (psycopg.errors.InvalidParameterValue, psycopg.errors.NoDataFound) as error:
+            hint = f" {error.diag.message_hint}" if error.diag.message_hint else ""
+            raise UserError(f"{error.diag.message_primary}.{hint}") from None
+        except psycopg.errors.InsufficientPrivilege:
+            raise UserError("the past of a survey needs role tunnel_inspector: GRANT tunnel_inspector TO …") from None
+        yield moment
 
 
 @contextmanager

@@ -16,6 +16,7 @@ from openpyxl.utils.exceptions import InvalidFileException
 
 from tunneldb.csvfile import read_header, read_rows, row_lines
 from tunneldb.errors import InputError, did_you_mean
+from tunneldb.numerals import parse_number
 from tunneldb.store.actions import EDITABLE, READ, add_action, change_action, list_actions
 
 COLUMNS = READ
@@ -156,15 +157,16 @@ def _value(name: str, cell: Any) -> Any:
     if name == "due":
         return _day(cell)
     try:
-        if name in _WHOLE:
-            if float(cell) != int(float(cell)):
+        if name in (*_WHOLE, *_NUMBERS):
+            value = parse_number(cell) if isinstance(cell, str) else cell + 0.0
+            if name in _NUMBERS:
+                return value
+            if not value.is_integer():
                 raise ValueError
-            return int(float(cell))
-        if name in _NUMBERS:
-            return float(cell)
+            return round(value)
         if name == "cost":
             return Decimal(str(cell)).quantize(Decimal("0.01"))
-    except (ValueError, OverflowError, InvalidOperation):
+    except (ValueError, TypeError, OverflowError, InvalidOperation):
         raise InputError(f"{name}: {cell!r} is no {'whole number' if name in _WHOLE else 'number'}") from None
     return str(cell)
 

@@ -365,13 +365,13 @@ EDITS = 500
 # the audit knows a survey by its name, and outlives it: it may hold edits of one of that name that was removed
 _AUDIT = sql.SQL(
     "SELECT {} FROM tunnel_api.audit"
-    " WHERE survey = %(name)s AND at >= (SELECT created_at FROM tunnel_api.survey WHERE id = %(id)s)"
+    " WHERE survey = %(name)s AND at >= (SELECT created_at FROM tunnel_api.survey WHERE id = %(id)s) AND at <= %(to)s"
 )
 
 
-def read_edits(conn: psycopg.Connection[Any], survey: Survey) -> tuple[int, list[Edit]]:
-    """Count the manual edits in a survey since it was added, and read the latest EDITS of them, latest first."""
-    which = {"name": survey.name, "id": survey.id, "most": EDITS}
+def read_edits(conn: psycopg.Connection[Any], survey: Survey, at: dt.datetime) -> tuple[int, list[Edit]]:
+    """Count the manual edits in a survey from its addition to a moment, and read the latest EDITS of them, latest first."""
+    which = {"name": survey.name, "id": survey.id, "most": EDITS, "to": at}
     row = conn.execute(_AUDIT.format(sql.SQL("count(*)")), which).fetchone()
     assert row is not None
     columns = sql.SQL(", ").join(sql.Identifier(f.name) for f in fields(Edit))

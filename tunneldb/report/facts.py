@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import hashlib
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,6 +12,7 @@ import numpy as np
 import psycopg
 
 from tunneldb.report import data, text
+from tunneldb.report.actions import Actions, digest_actions, read_actions
 from tunneldb.report.data import CoverageBins, Leak
 from tunneldb.report.drawing import step_for, ticks
 from tunneldb.report.findings import FindingsChapter, digest_findings, read_findings_chapter
@@ -50,6 +52,10 @@ class Request:
         Format of the pictures.
     progress : callable
         Called after each strip.
+    at : datetime
+        Moment whose state is reported.
+    past : bool
+        True if that is not the present.
     """
 
     survey: Survey
@@ -62,6 +68,8 @@ class Request:
     pictures: int | None
     form: Form
     progress: Progress
+    at: dt.datetime
+    past: bool = False
 
 
 class Facts:
@@ -170,6 +178,11 @@ class Facts:
         )  # fmt: skip
 
     @cached_property
+    def actions(self) -> Actions:
+        """Actions; in a report of the past those of the survey itself, because only its own edits are reverted."""
+        return read_actions(self.conn, self.survey, self.low, self.high, not self.request.past)
+
+    @cached_property
     def total(self) -> dict[str, Any]:
         """Statistics of the whole stretch."""
         return data.read_statistics(self.conn, self.survey, [self.low], [self.high])[0]
@@ -208,6 +221,7 @@ class Facts:
         if self.structures:
             digest_spots(digest, self.structures)
         digest_ratings(digest, self.ratings)
+        digest_actions(digest, self.actions, self.survey)
         return digest.hexdigest()[:16]
 
     def labels(self, chainages: list[float]) -> list[str]:

@@ -13,12 +13,13 @@ import numpy as np
 import psycopg
 
 from tunneldb import __version__
-from tunneldb.database import snapshot
+from tunneldb.database import as_of
 from tunneldb.errors import NotReadyError
 from tunneldb.export.tables.finding_counts import ORIGINS, SEVERITIES, STATES, UNCOUNTED
 from tunneldb.export.tables.leaks import clock_label
 from tunneldb.finding_kind import REVIEW_COLOURS
 from tunneldb.report import data, text
+from tunneldb.report.actions import follow_up_text
 from tunneldb.report.chapters import ALL
 from tunneldb.report.facts import Facts, Request, digest_spots
 from tunneldb.report.findings import STATE_WORDS
@@ -28,6 +29,7 @@ from tunneldb.report.owner import Owner
 from tunneldb.report.photos import Thumbnail
 from tunneldb.report.pictures.load import Source
 from tunneldb.report.rating import headline, measured, name_elements, result_text
+from tunneldb.report.record import in_html, record_of
 from tunneldb.report.strip import Progress
 from tunneldb.report.structures import read_structures
 from tunneldb.store.catalog import crs_text
@@ -68,6 +70,7 @@ def write_html(
     owner: Owner | None = None,
     photos: Source | None = None,
     listed: int = MAX_LISTED_LEAKS,
+    moment: dt.datetime | None = None,
 ) -> Written:
     """Write the report of a survey, or of the stretch between two chainages, m, as an HTML file; the connection must be idle.
 
@@ -87,13 +90,17 @@ def write_html(
         Folder and servers of photos; else files in the current folder, and the web.
     listed : int
         Maximum number of leaks, the largest, that are listed and drawn; rejected ones last. Totals and digest include all.
+    moment : datetime, optional
+        Moment at which the survey is reported; else the present.
     """
     wanted = Owner() if owner is None else owner
-    with snapshot(conn):
+    with as_of(conn, survey.name, moment) as at:
         search = read_coverage(conn, survey, low, high)
         ends = data.find_stretch(conn, survey, low, high)
         place = Source() if photos is None else photos
-        facts = Facts(conn, Request(survey, *ends, search, wanted, place, listed, pictures, form, progress))
+        facts = Facts(
+            conn, Request(survey, *ends, search, wanted, place, listed, pictures, form, progress, at, moment is not None)
+        )
         with path.open("w", encoding="utf-8") as file:
             file.writelines(_template("report.html", wanted).generate(_context(facts)))
         found = facts.findings
@@ -113,16 +120,16 @@ def write_site_html(conn: psycopg.Connection[Any], survey: Survey, path: Path, o
     UserError
         Members were never looked for.
     """
-    with snapshot(conn):
+    with as_of(conn, survey.name) as now:
         found = read_structures(conn, survey)
         if found is None:
             raise NotReadyError(f"survey {survey.name} has nothing to report yet: tunneldb members {survey.name}")
         numbers = {spot.id: spot.number for spot in found.spots.rows}
-        edits_in_all, edits = data.read_edits(conn, survey)
+        edits_in_all, edits = data.read_edits(conn, survey, now)
         context = {
             "survey": survey,
             "version": __version__,
-            "now": dt.datetime.now(dt.UTC),
+            "now": now,
             "digest": digest_spots(hashlib.sha256(survey.name.encode()), found).hexdigest()[:16],
             "structures": found,
             "files": data.read_files_of_site(conn, survey),
@@ -153,7 +160,12 @@ def _template(name: str, owner: Owner) -> jinja2.Template:
     environment.globals |= {"_": owner.words, "owner": owner}
     environment.globals |= {"origins": ORIGINS, "severities": SEVERITIES, "uncounted": UNCOUNTED, "said": STATE_WORDS}
     environment.globals |= {"review_colours": REVIEW_COLOURS}
-    environment.globals |= {"headline": headline, "name_elements": name_elements, "result_text": result_text}
+    environment.globals |= {
+        "headline": headline,
+        "name_elements": name_elements,
+        "result_text": result_text,
+        "follow_up": follow_up_text,
+    }
     return environment.get_template(name)
 
 
@@ -165,6 +177,9 @@ def _context(facts: Facts) -> dict[str, Any]:
     return {
         "version": __version__,
         "now": dt.datetime.now(dt.UTC),
+        "at": facts.request.at,
+        "past": facts.request.past,
+        "record": in_html(record_of(facts)),
         "survey": facts.survey,
         "facts": facts,
         "chapters": chosen,

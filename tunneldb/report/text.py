@@ -132,7 +132,14 @@ def script_json(value: Any) -> Markup:
     return Markup(plain.replace("<", "\\u003c"))
 
 
-_WHAT = {"finding": "finding", "axis_vertex": "axis vertex", "region": "region", "spot": "spot", "photo": "photo"}
+_WHAT = {
+    "finding": "finding",
+    "axis_vertex": "axis vertex",
+    "region": "region",
+    "spot": "spot",
+    "photo": "photo",
+    "action": "action",
+}
 
 
 def edit(entry: Edit, spots: Mapping[int, int]) -> dict[str, str]:
@@ -153,7 +160,7 @@ def edit(entry: Edit, spots: Mapping[int, int]) -> dict[str, str]:
 
 def _come_or_gone(view: str, before: Row, after: Row) -> str:
     """Describe what was drawn, added, deleted or removed."""
-    verb = ("added" if after else "removed") if view == "photo" else "drawn" if after else "deleted"
+    verb = ("added" if after else "removed") if view in ("photo", "action") else "drawn" if after else "deleted"
     stated = {
         name: value for name, value in (after or before).items() if name not in ("geom", "finding_id") and value is not None
     }

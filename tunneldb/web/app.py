@@ -15,7 +15,21 @@ from starlette.middleware.gzip import GZipMiddleware
 from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 
-from tunneldb.web import exports, findings, health, ogc, photos, pictures, points, sections, sign_in, surveys, tiles
+from tunneldb.web import (
+    actions,
+    exports,
+    findings,
+    health,
+    ogc,
+    photos,
+    pictures,
+    points,
+    rating,
+    sections,
+    sign_in,
+    surveys,
+    tiles,
+)
 from tunneldb.web.config import Desk
 from tunneldb.web.pages import FOLDER, STATIC, worker
 from tunneldb.web.route import MAX_LARGE, route
@@ -59,6 +73,7 @@ def create_app(desk: Desk) -> Starlette:
 
     survey = "/api/surveys/{survey}"
     finding = "/api/findings/{id:key}"
+    action = "/api/actions/{id:key}"
     tile = "/tiles/{survey}"
     app = Starlette(
         lifespan=lifespan,
@@ -82,6 +97,13 @@ def create_app(desk: Desk) -> Starlette:
             Route(f"{survey}/points", route(points.points, large=True)),
             Route(f"{survey}/outlines", route(points.outlines)),
             Route(f"{survey}/export", route(exports.export)),
+            Route(f"{survey}/rating/choices", route(rating.choices)),
+            Route(f"{survey}/rating", route(rating.one)),
+            Route(f"{survey}/rating/change", route(rating.change)),
+            Route(f"{survey}/actions", route(actions.of_survey)),
+            Route(f"{survey}/actions", route(actions.add), methods=["POST"]),
+            Route(action, route(actions.change), methods=["PATCH"]),
+            Route(action, route(actions.delete), methods=["DELETE"]),
             Route(f"{survey}/worklist", route(findings.worklist)),
             Route(f"{survey}/findings", route(findings.draw), methods=["POST"]),
             Route("/api/findings/merge", route(findings.merge), methods=["POST"]),

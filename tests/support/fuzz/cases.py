@@ -67,6 +67,7 @@ OF_FILES: tuple[tuple[str, str], ...] = (
     ("stations.csv", "members {seeds}/cloud.las --stations {file} --intensity intensity --intensity-kind linear -o {out}.gpkg"),
     ("axis.csv", "serve --no-open --port 0 --certificate {file} --key {seeds}/axis.csv"),
     ("axis.csv", "serve --no-open --port 0 --certificate {seeds}/axis.csv --key {file}"),
+    ("signed.html", "report --verify {file}"),
     ("template.toml", "report demo-2024 --template {file} -o {out}.html"),
     ("elements.csv", "elements add demo {new} --file {file}"),
     ("rating.toml", "rating add {file}"),

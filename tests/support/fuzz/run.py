@@ -261,7 +261,7 @@ def _invoke(case: Case) -> tuple[int, str, str]:
 
 
 def _fault(words: list[str], code: int | None, said: str) -> str:
-    further = (3, 4, 5) if words[:2] == ["alarms", "check"] else ()
+    further = (3, 4, 5) if words[:2] in (["alarms", "check"], ["report", "--verify"]) else ()
     if code not in (0, 1, 2, *further):
         return f"exit code {code}"
     if code != 2:

@@ -68,6 +68,11 @@ def write_seeds(folder: Path, axis: np.ndarray, surface: Surface) -> None:
         folder / "actions.csv",
         "id,survey,chainage_from,chainage_to,measure,due,cost,currency\n,demo-2024,12310,12312,seal,2030-01-31,12.5,EUR\n",
     )
+    _write(
+        folder / "signed.html",
+        '<script type="application/json" id="record">{"survey": "demo-2024", "low": 12300.0, "high": 12500.0, "at":'
+        ' "2999-01-01T00:00:00+00:00", "digest": "0123456789abcdef", "leaks": true, "listed": 1000, "ratings": []}</script>',
+    )
     _write(folder / "template.toml", 'client = "Owner"\nlanguage = "de"\n\n[headings]\n"Leak" = "Wasserzutritt"\n')
     for name in ("points", "axis"):
         lines = (DATA / "wriggle" / f"{name}.csv").read_text().splitlines()[: 60 if name == "points" else None]

@@ -27,6 +27,7 @@ from tunneldb.export.qgis.layer import (
     VectorLayer,
 )
 from tunneldb.export.qgis.raster import BED, FILLED, KINDS, SUBMERGED, image_kind, pipe
+from tunneldb.export.qgis.rating_style import rating_renderer
 from tunneldb.export.qgis.source import RECOMPUTED_FROM, Source, recompute
 from tunneldb.export.qgis.styles import style_elements
 from tunneldb.raster.geotiff import CHANGE as CHANGE_KIND
@@ -55,16 +56,29 @@ def layer_id(name: str) -> str:
 
 
 def vector_entry(
-    layer: VectorLayer, source: Source, survey: Survey, crs: ET.Element, catalogue: Catalogue | None, *, in_space: bool
+    layer: VectorLayer,
+    source: Source,
+    survey: Survey,
+    crs: ET.Element,
+    catalogue: Catalogue | None,
+    *,
+    in_space: bool,
+    results: Sequence[str] = (),
 ) -> Entry:
-    """Return a layer on a view; a 3D view draws it only if it is in space."""
+    """Return a layer on a view; a 3D view draws it only if it is in space.
+
+    Parameters
+    ----------
+    results : sequence of str
+        Results of the scheme of a layer of ratings, from the best to the worst.
+    """
     element = ET.Element(
         "maplayer", type="vector", geometry=layer.geometry, wkbType=layer.wkb, readOnly=str(int(not layer.edited)),
         autoRefreshEnabled="0", refreshOnNotifyEnabled="0", hasScaleBasedVisibilityFlag="0",
         minScale="0", maxScale="0", styleCategories="AllStyleCategories",
     )  # fmt: skip
     ET.SubElement(element, "id").text = layer_id(layer.id)
-    ET.SubElement(element, "datasource").text = source.layer(layer, survey.name, survey.srid)
+    ET.SubElement(element, "datasource").text = source.layer(layer, survey)
     ET.SubElement(element, "layername").text = layer.title
     ET.SubElement(element, "srs").append(deepcopy(crs) if layer.on_map else no_crs())
     ET.SubElement(element, "provider", encoding="UTF-8").text = "postgres"
@@ -72,6 +86,9 @@ def vector_entry(
         element.extend(finding_style(catalogue, layer.geometry, in_space=False, on_sheet=True))
     elif layer.shows_findings and catalogue is not None:
         element.extend(_findings(layer, catalogue, survey, in_space=in_space))
+    elif layer.style == "rating" and results:
+        element.append(rating_renderer(results))
+        element.extend(part for part in style_elements(layer.style) if part.tag != "renderer-v2")
     else:
         element.extend(part for part in style_elements(layer.style) if in_space or part.tag != "renderer-3d")
     if layer.id in RECOMPUTED_FROM:
@@ -86,6 +103,14 @@ def vector_entry(
                 f"A dry region of more than {limit:g} m² must say why; an operator then puts it in force.",
             )
         )  # fmt: skip
+    elif layer.style == "action":
+        element.append(defaults({"survey": survey.name, "urgency": "planned", "state": "open"}))
+        if not layer.on_map:  # a point of the unrolled plane states its chainage and arc
+            places = {"chainage_from": "x($geometry)", "chainage_to": "x($geometry)", "arc": "y($geometry)"}
+            for column, expression in places.items():
+                ET.SubElement(
+                    element[-1], "default", field=column, expression=f"round({expression}, 3)", applyOnUpdate="0"
+                )  # fmt: skip
     elif layer.id in NEW_KINDS:
         element.append(defaults({"survey": survey.name, "kind": NEW_KINDS[layer.id], "review": "confirmed"}))
     return Entry(layer_id(layer.id), layer.title, layer.path, layer.themes, element)

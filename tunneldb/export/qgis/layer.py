@@ -65,6 +65,8 @@ class VectorLayer:
         Condition on the rows that it shows, beside that on the survey.
     part : str
         Subgroup in its group, if any.
+    of_tunnel : bool
+        True if it shows the rows of all surveys of the tunnel.
     """
 
     id: str
@@ -78,6 +80,7 @@ class VectorLayer:
     column: str = "geom"
     where: str = ""
     part: str = ""
+    of_tunnel: bool = False
 
     @property
     def on_map(self) -> bool:
@@ -139,6 +142,7 @@ def _findings(suffix: str, group: str, theme: str, z: str = "", where: str = "")
 
 # In drawing order within a group, from the top.
 LAYERS = (
+    VectorLayer("action_map", "Actions of the tunnel", "action_map", "Point", "action", MAP, (MAP,), True, of_tunnel=True),
     *_findings("map", MAP, FINDINGS_MAP),
     VectorLayer("axis_vertex", "Axis vertices (editable)", "axis_vertex", "PointZ", "axis_vertex", MAP, (MAP,), True),
     VectorLayer("leak_map", "Leaks beside the axis, unrolled (review)", "leak_map", "Polygon", "leak", MAP, (MAP,), True),
@@ -154,6 +158,10 @@ LAYERS = (
     VectorLayer("cluster", "Objects, rails, fixtures", "cluster", "Polygon", "cluster", MAP, (MAP,)),
     VectorLayer(
         "detectability_map", "What could be found, beside the axis", "detectability_map", "Polygon", "detectability", MAP, ()
+    ),
+    VectorLayer(
+        "action_unrolled", "Actions of the tunnel, on the lining", "action_unrolled", "Point", "action", UNROLLED, (UNROLLED,),
+        True, of_tunnel=True,
     ),
     *_findings("unrolled", UNROLLED, FINDINGS),
     VectorLayer(
@@ -236,6 +244,11 @@ RING_LAYERS = (
     VectorLayer("ring_unrolled", "Rings, by ovality", "ring_unrolled", "Polygon", "ring", UNROLLED, ()),
 )
 """Layers of a survey whose lining has rings."""
+RATING_LAYERS = (
+    VectorLayer("rating_map", "Rating, beside the axis", "rating_map", "MultiPolygon", "rating", MAP, (MAP,)),
+    VectorLayer("rating_unrolled", "Rating", "rating_unrolled", "MultiPolygon", "rating", UNROLLED, (UNROLLED,)),
+)
+"""Layers of a rating by one scheme, which who writes the project names."""
 DEVIATION_LAYERS = (
     VectorLayer("deviation_map", "Over- and underbreak", "deviation_map", "LineString", "deviation_map", MAP, ()),
     VectorLayer(

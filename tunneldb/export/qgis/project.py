@@ -7,7 +7,7 @@ import xml.etree.ElementTree as ET
 import zipfile
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import psycopg
@@ -25,6 +25,7 @@ from tunneldb.export.qgis.layer import (
     CLEARANCE_LAYERS,
     DEVIATION_LAYERS,
     LAYERS,
+    RATING_LAYERS,
     RING_LAYERS,
     SCANNER_LAYERS,
     SHEET_FINDING,
@@ -36,7 +37,7 @@ from tunneldb.export.qgis.layer import (
 from tunneldb.export.qgis.member_sheet import member_layout
 from tunneldb.export.qgis.raster import shown_limits
 from tunneldb.export.qgis.sheet import sheet_layout
-from tunneldb.export.qgis.source import Source
+from tunneldb.export.qgis.source import Source, literal
 from tunneldb.export.qgis.space import docks, filled_layers, has_rows, scene, site_viewpoint, viewpoint
 from tunneldb.export.qgis.styles import require_table
 from tunneldb.export.qgis.tree import themes_element, tree_element
@@ -56,12 +57,39 @@ QGIS_VERSION = "3.22.0-Białowieża"
 _DOCTYPE = "<!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>\n"
 
 
+@dataclass(frozen=True)
+class Rating:
+    """Rating of a survey that a project shows.
+
+    Attributes
+    ----------
+    element_set, scheme, version : str
+    results : tuple of str
+        Results of the scheme, from the best to the worst.
+    """
+
+    element_set: str
+    scheme: str
+    version: str
+    results: tuple[str, ...]
+
+    def layers(self) -> list[VectorLayer]:
+        """Return the layers of the rating."""
+        values = {"element_set": self.element_set, "scheme": self.scheme, "version": self.version}
+        where = " AND ".join(f'"{column}" = {literal(value)}' for column, value in values.items())
+        name = f"{self.element_set} by {self.scheme} {self.version}"
+        return [
+            replace(layer, title=layer.title.replace("Rating", f"Rating of {name}", 1), where=where) for layer in RATING_LAYERS
+        ]
+
+
 def write_project(
     conn: psycopg.Connection,
     survey: Survey,
     output: Path,
     images: Sequence[Path] = (),
     service: str | None = None,
+    rating: Rating | None = None,
 ) -> None:
     """Write a project with the layers of a survey into a file.
 
@@ -78,13 +106,15 @@ def write_project(
         holds their paths relative to itself.
     service : str, optional
         Entry of ``pg_service.conf`` by which QGIS connects, instead of this connection's host and database.
+    rating : Rating, optional
+        Rating of the survey that the project shows.
 
     Raises
     ------
     UserError
         The survey has no axis, of a site no members, or its SRID is unknown.
     """
-    text = _text(_project(conn, survey, images, output.parent, service))
+    text = _text(_project(conn, survey, images, output.parent, service, rating))
     with replacing(output) as temporary:
         if output.suffix.lower() == ".qgs":
             temporary.write_text(text, encoding="utf-8")
@@ -98,6 +128,7 @@ def store_project(
     name: str,
     images: Sequence[Path] = (),
     service: str | None = None,
+    rating: Rating | None = None,
 ) -> None:
     """Store a project in ``public.qgis_projects``, from which QGIS opens it; one with the same name is replaced.
 
@@ -105,7 +136,7 @@ def store_project(
     ----------
     conn : psycopg.Connection
         Connection whose transaction this joins.
-    survey, images, service
+    survey, images, service, rating
         As in :func:`write_project`, but the project has absolute paths of the images.
     name : str
         Name of the project there.
@@ -116,7 +147,7 @@ def store_project(
         As in :func:`write_project`, or if the table is missing.
     """
     require_table(conn, "public.qgis_projects")
-    content = _archive(_text(_project(conn, survey, images, None, service)), name)
+    content = _archive(_text(_project(conn, survey, images, None, service, rating)), name)
     conn.execute(
         "INSERT INTO public.qgis_projects (name, metadata, content) VALUES (%s, jsonb_build_object("
         "'last_modified_time', (clock_timestamp() AT TIME ZONE 'UTC')::text, 'last_modified_user', session_user), %s) "
@@ -126,7 +157,12 @@ def store_project(
 
 
 def _project(
-    conn: psycopg.Connection, survey: Survey, images: Sequence[Path], folder: Path | None, service: str | None
+    conn: psycopg.Connection,
+    survey: Survey,
+    images: Sequence[Path],
+    folder: Path | None,
+    service: str | None,
+    rating: Rating | None,
 ) -> ET.Element:
     """Return the project's root, with paths relative to its folder, or absolute without one."""
     crs = crs_element(conn, survey.srid)
@@ -134,13 +170,16 @@ def _project(
     cells = first_members(conn, survey.name)
     structures = survey.site or cells is not None
     designed = layers_held(conn, survey)[:1]
-    layers = _layers(conn, survey, designed, structures=structures)
+    layers = (*_layers(conn, survey, designed, structures=structures), *(rating.layers() if rating else ()))
     filled = filled_layers(conn, survey.name, layers)
     catalogue = None if survey.site else read_catalogue(conn, survey)
     entries = [table_entry(source, survey, "remark", "Notes and limitations (table)", counted=True)]
     if structures:
         entries.append(table_entry(source, survey, "member_statistics", "Members (table)"))
-    entries += [vector_entry(layer, source, survey, crs, catalogue, in_space=layer.id in filled) for layer in layers]
+    results = rating.results if rating else ()
+    entries += [
+        vector_entry(layer, source, survey, crs, catalogue, in_space=layer.id in filled, results=results) for layer in layers
+    ]
     entries += image_entries(images, folder, crs)
     if catalogue is not None:
         entries += list_entries(source, survey)
@@ -158,7 +197,7 @@ def _project(
     root.append(themes_element(entries, site=survey.site))
     root.append(bookmarks_element(views, crs))
     root.append(_properties(absolute=folder is None))
-    known = {layer.id: (layer_id(layer.id), source.layer(layer, name, survey.srid)) for layer in layers}
+    known = {layer.id: (layer_id(layer.id), source.layer(layer, survey)) for layer in layers}
     layouts = _layouts(conn, survey, source, known, catalogue, images, designed=bool(designed))
     if cells is not None:
         layouts.append(member_layout(survey, known["member_sheet"], known["spot_sheet"]))

@@ -21,6 +21,11 @@ def quote(value: str) -> str:
     return "'" + value.replace("\\", "\\\\").replace("'", "\\'") + "'"
 
 
+def literal(value: str) -> str:
+    """Return a text as an SQL literal."""
+    return "'" + value.replace("'", "''") + "'"
+
+
 @dataclass(frozen=True)
 class Source:
     """Connection of QGIS to the database.
@@ -61,21 +66,21 @@ class Source:
             parts.append(f"sslmode={mode}")
         return cls(" ".join(parts))
 
-    def layer(self, layer: VectorLayer, survey: str, srid: int) -> str:
-        """Return the data source of a layer, restricted to a survey.
+    def layer(self, layer: VectorLayer, survey: Survey) -> str:
+        """Return the data source of a layer, restricted to a survey or to its tunnel.
 
         Key, SRID and type are stated and statistics trusted, so that QGIS doesn't scan the view to find them out.
         """
-        name = "'" + survey.replace("'", "''") + "'"
+        rows = f'"tunnel" = {literal(survey.tunnel)}' if layer.of_tunnel else f'"survey" = {literal(survey.name)}'
         return (
-            f"{self.connection} key='id' estimatedmetadata=true srid={srid if layer.on_map else 0} type={layer.wkb} "
+            f"{self.connection} key='id' estimatedmetadata=true srid={survey.srid if layer.on_map else 0} type={layer.wkb} "
             f'checkPrimaryKeyUnicity=\'0\' table="tunnel_api"."{layer.view}" ({layer.column}) '
-            f'sql="survey" = {name}{" AND " + layer.where if layer.where else ""}'
+            f"sql={rows}{' AND ' + layer.where if layer.where else ''}"
         )
 
     def table(self, view: str, survey: str | None) -> str:
         """Return the data source of a view without geometry, of a survey or of all; its rows are counted, not estimated."""
-        name = "" if survey is None else '"survey" = \'' + survey.replace("'", "''") + "'"
+        name = "" if survey is None else f'"survey" = {literal(survey)}'
         return (
             f"{self.connection} key='id' estimatedmetadata=false checkPrimaryKeyUnicity='0' "
             f'table="tunnel_api"."{view}" sql={name}'

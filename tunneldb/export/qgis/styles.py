@@ -14,6 +14,7 @@ from tunneldb.export.qgis.layer import (
     CLEARANCE_LAYERS,
     DEVIATION_LAYERS,
     LAYERS,
+    RATING_LAYERS,
     RING_LAYERS,
     SCANNER_LAYERS,
     STRUCTURE_LAYERS,
@@ -107,6 +108,7 @@ def styled_columns() -> list[tuple[str, str, str, str]]:
             UNDERWATER_LAYERS,
             CLEARANCE_LAYERS,
             RING_LAYERS,
+            RATING_LAYERS,
             DEVIATION_LAYERS,
             CHANGE_LAYERS,
         )

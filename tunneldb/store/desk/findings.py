@@ -9,6 +9,7 @@ from typing import Any
 import psycopg
 from psycopg import sql
 
+from tunneldb.store.desk import actions
 from tunneldb.store.desk.photos import is_stored
 from tunneldb.store.desk.rows import named
 
@@ -46,7 +47,7 @@ def worklist(
 
 
 def finding(conn: psycopg.Connection[Any], finding_id: int) -> dict[str, Any] | None:
-    """Return a finding with its evidence, photos and history; None if there is none."""
+    """Return a finding with its evidence, photos, actions and history; None if there is none."""
     with conn.pipeline():  # one round trip for all
         rows = conn.execute(
             "SELECT f.id, f.survey, f.label, f.clock, f.chainage_from, f.chainage_to, f.arc_from, f.arc_to, f.kind,"
@@ -71,11 +72,13 @@ def finding(conn: psycopg.Connection[Any], finding_id: int) -> dict[str, Any] | 
             " WHERE a.row_id = %s AND a.view = 'finding' ORDER BY a.id DESC LIMIT 50",
             [finding_id],
         )
+        demanded = actions.read_of_finding(conn, finding_id)
     found = named(rows)
     if not found:
         return None
+    shown = {"actions": named(demanded), "evidence": named(evidence), "history": named(history)}
     listed = [photo | {"stored": is_stored(photo["path"])} for photo in named(photos)]
-    return {**found[0], "evidence": named(evidence), "photos": listed, "history": named(history)}
+    return {**found[0], **shown, "photos": listed}
 
 
 def write_review(conn: psycopg.Connection[Any], finding_id: int, seen: Mapping[str, Any], values: Mapping[str, Any]) -> bool:

@@ -15,10 +15,10 @@ export function headOf(finding) {
     STATES[finding.state] ? el('p', { class: 'warn-text', text: `Not included in the totals: ${STATES[finding.state]}.` }) : null);
 }
 
-/** Return the photos, values, evidence and history of a finding. */
-export function factsOf(finding, survey, severities, photos, say) {
+/** Return the photos, values, actions, evidence and history of a finding. */
+export function factsOf(finding, survey, severities, photos, demanded, say) {
   return el('div', { class: 'finding-facts' },
-    photos, valuesOf(finding, severities), evidenceOf(finding), historyOf(finding), finding.id > 0 ? linkOf(finding, survey, say) : null);
+    photos, valuesOf(finding, severities), demanded, evidenceOf(finding), historyOf(finding), finding.id > 0 ? linkOf(finding, survey, say) : null);
 }
 
 function valuesOf(finding, severities) {

@@ -1,5 +1,6 @@
 /** Layers of the lining: image, findings, and a hatch where there is no image. */
 
+import { levelColour } from './levels.js';
 import { hatch } from './ribbon.js';
 import { findingsAddress, imageAddress, MAX_TILE_ZOOM, MIN_ZOOM, projection, resolutionAt, surveyExtent, tileGridOf } from './plane.js';
 
@@ -9,6 +10,8 @@ export const REVIEW_COLOURS = { open: '#e67e00', confirmed: '#005caf', rejected:
 export const DETECTED_DRY = ['joint', 'dark'];
 const COUNTED = ['open', 'confirmed'];
 const TALL = 4 * resolutionAt(MIN_ZOOM);
+/** Height of an element on the screen from which it has a label, pixels. */
+const LABEL_HEIGHT = 40;
 const WHITE = 'rgba(255,255,255,.8)';
 
 /** Return the layer of an image of a survey. */
@@ -114,6 +117,49 @@ export function highlightLayer() {
     }),
   ];
   return new ol.layer.Vector({ source: new ol.source.Vector(), style, zIndex: 20 });
+}
+
+/** Return the layer of rated elements: features with element and levels. */
+export function ratingLayer() {
+  const styles = new Map();
+  const style = (feature, resolution) => {
+    const { element, levels } = feature.getProperties();
+    const labelled = ol.extent.getHeight(feature.getGeometry().getExtent()) > LABEL_HEIGHT * resolution;
+    const key = `${element.level}|${element.complete}|${levels}|${labelled && `${element.name}|${element.result_text}`}`;
+    if (!styles.has(key)) styles.set(key, elementStyle(element, levels, labelled));
+    return styles.get(key);
+  };
+  return new ol.layer.Vector({ source: new ol.source.Vector(), style, zIndex: 1.5, declutter: true });
+}
+
+function elementStyle(element, levels, labelled) {
+  const colour = levelColour(element, levels) ?? '#8a6a3f';
+  const plain = element.level !== null && element.complete;
+  const fill = new ol.style.Fill({ color: plain ? levelColour(element, levels, 0.22) : stripes(levelColour(element, levels, 0.3)) });
+  const text = labelled ? new ol.style.Text({
+    text: `${element.name}: ${element.result_text}`, font: '600 12px system-ui, sans-serif', fill: new ol.style.Fill({ color: '#1d2730' }),
+    backgroundFill: new ol.style.Fill({ color: 'rgba(255,255,255,.85)' }), padding: [2, 4, 1, 4],
+  }) : undefined;
+  return [new ol.style.Style({ stroke: stroke(WHITE, 4) }), new ol.style.Style({ fill, stroke: stroke(colour, 2), text })];
+}
+
+/** Return the pattern of a result that is a lower bound; without a colour, of what is not rated. */
+function stripes(colour) {
+  const tile = document.createElement('canvas');
+  tile.width = 12;
+  tile.height = 12;
+  const c = tile.getContext('2d');
+  c.fillStyle = colour ?? 'rgba(251,233,214,.35)';
+  c.fillRect(0, 0, 12, 12);
+  c.strokeStyle = colour ? 'rgba(255,255,255,.4)' : 'rgba(184,98,27,.6)';
+  c.lineWidth = 1.5;
+  c.beginPath();
+  for (const shift of [-12, 0, 12]) {
+    c.moveTo(shift - 2, 14);
+    c.lineTo(shift + 14, -2);
+  }
+  c.stroke();
+  return c.createPattern(tile, 'repeat');
 }
 
 /** Return the geometry of a finding's outline. */

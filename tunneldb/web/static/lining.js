@@ -4,7 +4,7 @@ import { get, surveyPath } from './api.js';
 import { ClockScale, drawAxes, positionText } from './axis.js';
 import { Comparison } from './compare.js';
 import { debounce, el } from './dom.js';
-import { findingsLayer, geometryOf, hatchLayer, highlightLayer, imageLayer, recordedLayer } from './layers.js';
+import { findingsLayer, geometryOf, hatchLayer, highlightLayer, imageLayer, ratingLayer, recordedLayer } from './layers.js';
 import { MAX_ZOOM, MIN_ZOOM, projection, resolutionAt, surveyExtent, zoomAt } from './plane.js';
 
 const { ol } = globalThis;
@@ -36,13 +36,14 @@ export class Lining {
     root.replaceChildren(this.tools, el('div', { class: 'maps' }, first, this.comparison.box), el('div', { class: 'readout' }, this.position, this.legend, this.scale));
     this.highlight = highlightLayer();
     this.recorded = recordedLayer();
+    this.rated = ratingLayer();
     this.map = this.build();
   }
 
   build() {
     const map = new ol.Map({
       target: this.box,
-      layers: [this.recorded, this.highlight],
+      layers: [this.rated, this.recorded, this.highlight],
       controls: [
         new ol.control.Zoom({ zoomInTipLabel: 'Zoom in', zoomOutTipLabel: 'Zoom out' }),
         new ol.control.ScaleLine({ target: this.scale, units: 'metric', minWidth: 80 }),
@@ -180,6 +181,27 @@ export class Lining {
     const { arc_from: first, arc_to: last } = this.survey;
     const half = Math.min((height * resolution) / 2, (last - first) / 2) - 40 * resolution;
     this.goTo((from + to) / 2, Math.min(Math.max((low + high) / 2, first + half), last - half), zoomAt(resolution));
+  }
+
+  /** Show rated elements; null shows none. */
+  showRating(rating) {
+    const source = this.rated.getSource();
+    source.clear();
+    if (!rating) return;
+    source.addFeatures(rating.elements.flatMap((element) => element.boxes.map((box) => new ol.Feature({
+      geometry: ol.geom.Polygon.fromExtent(box), element, levels: rating.levels,
+    }))));
+  }
+
+  /** Go to an element, fit it, and mark it. */
+  showElement({ boxes }) {
+    const source = this.highlight.getSource();
+    source.clear();
+    source.addFeatures(boxes.map((box) => new ol.Feature(ol.geom.Polygon.fromExtent(box))));
+    const [from, low, to, high] = boxes.reduce((whole, box) => ol.extent.extend(whole, box), ol.extent.createEmpty());
+    const [width, height] = this.map.getSize() ?? [800, 500];
+    const resolution = Math.max((1.3 * (to - from)) / width, (1.2 * (high - low)) / height, resolutionAt(MAX_ZOOM - 0.3));
+    this.goTo((from + to) / 2, (low + high) / 2, zoomAt(resolution));
   }
 
   /** Mark the finding that the panel shows; null marks none. */

@@ -1,5 +1,6 @@
 /** The desk: connects address, survey, map and panel. */
 
+import { ActionsPanel } from './actions.js';
 import { get, surveyPath } from './api.js';
 import { button, debounce, el } from './dom.js';
 import { station, time } from './format.js';
@@ -10,6 +11,7 @@ import { heldStretches, removeOthers } from './held.js';
 import { Lining } from './lining.js';
 import { Network } from './network.js';
 import { Panel } from './panel.js';
+import { RatingPanel } from './rating.js';
 import { Review } from './review.js';
 import { Ribbon } from './ribbon.js';
 import { findingOf, Outbox, textOf } from './outbox.js';
@@ -28,7 +30,7 @@ const node = (id) => document.getElementById(id);
 const user = meta('user');
 const canWrite = ['inspector', 'operator'].includes(meta('role'));
 
-const app = { surveys: [], survey: null, summary: null, finding: null, routing: false, turn: 0, hash: '' };
+const app = { surveys: [], survey: null, summary: null, finding: null, element: null, routing: false, turn: 0, hash: '' };
 
 function say(text, wrong = false) {
   const state = node('state');
@@ -84,6 +86,7 @@ const review = new Review(session, {
   shown: (finding, fit) => show(finding, fit),
   marked: (finding) => mark(finding),
   changed: () => changed(),
+  actions: (wanted) => openActions(wanted),
   outlined: () => lining.shown.findings,
   outlines: (on) => {
     lining.shown.findings = on;
@@ -97,6 +100,22 @@ const review = new Review(session, {
 const space = new Space(node('space'), { picked, closed, shown: () => lining.shown });
 const network = new Network(meta('held') || null, { away: showNetwork, back: reconnected });
 const section = new SectionPanel(() => lining.view.x, () => session.facts);
+const rating = new RatingPanel({
+  shown: (found) => {
+    ribbon.setRating(found);
+    showElements();
+  },
+  on: () => showElements(),
+  go: (element) => {
+    if (space.open) {
+      space.go((element.chainage_from + element.chainage_to) / 2);
+      return;
+    }
+    lining.showElement(element);
+    app.element = element;
+  },
+});
+const actions = new ActionsPanel({ canWrite, say, current: () => session.facts, changed: (found) => review.takeActions(found) });
 const draw = new DrawPanel(lining, {
   canWrite, say, outbox,
   current: () => session.facts,
@@ -188,16 +207,34 @@ function changed(wait = null) {
   else reread();
 }
 
-function showTab(tab) {
+/** Show the results of elements on the lining while the rating is open. */
+function showElements() {
+  const open = panel.tab === 'rating';
+  lining.showRating(open && rating.coloured ? rating.rating : null);
+  if (open || !app.element) return;
+  app.element = null;
+  lining.mark(session.facts);
+}
+
+/** Show an action, or the form of a new one for the finding that is shown. */
+function openActions(wanted) {
+  panel.choose('actions', true);
+  showTab('actions', wanted);
+}
+
+function showTab(tab, wanted = {}) {
   review.setReviewing(tab === 'review');
   if (tab !== 'draw') draw.cancel();
   else if (space.open) space.close();
   const content = {
-    finding: () => review.root, review: () => review.root, draw: () => draw.root, section: () => section.root,
+    finding: () => review.root, review: () => review.root, draw: () => draw.root, section: () => section.root, rating: () => rating.root, actions: () => actions.root,
     offline: () => offlineRoot, downloads: () => downloadsPanel(app.survey, stretch, meta('role') === 'operator'), notes: () => notesPanel(app.summary),
   }[tab]();
   panel.fill(content);
   if (tab === 'section') section.open();
+  if (tab === 'rating') rating.open();
+  if (tab === 'actions') actions.open(wanted);
+  showElements();
   if (tab === 'draw') draw.refresh();
   if (tab === 'offline') openOffline();
   address();
@@ -291,6 +328,8 @@ async function openSurvey(name, state, latest) {
   lining.tools.append(button('3D', openSpace));
   review.setSurvey(survey);
   section.setSurvey(survey);
+  rating.setSurvey(survey);
+  actions.setSurvey(survey);
   space.setSurvey(survey);
   draw.setSurvey(survey);
   showRecords();

@@ -2,7 +2,7 @@
 
 import { el } from './dom.js';
 
-const TABS = [['finding', 'Finding'], ['review', 'Review'], ['draw', 'Draw'], ['section', 'Section'], ['downloads', 'Download'], ['offline', 'Offline'], ['notes', 'Notes']];
+const TABS = [['finding', 'Finding'], ['review', 'Review'], ['draw', 'Draw'], ['section', 'Section'], ['rating', 'Rating'], ['actions', 'Actions'], ['downloads', 'Download'], ['offline', 'Offline'], ['notes', 'Notes']];
 
 /** Panel with tabs. */
 export class Panel {
@@ -39,7 +39,7 @@ export class Panel {
       if (on) tab.scrollIntoView({ block: 'nearest', inline: 'nearest' });
     }
     this.body.setAttribute('aria-labelledby', `tab-${name}`);
-    this.root.classList.toggle('wide', name === 'review');
+    this.root.classList.toggle('wide', ['review', 'rating'].includes(name));
     if (!quiet) this.chosen(name);
   }
 

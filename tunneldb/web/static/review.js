@@ -1,5 +1,6 @@
 /** Review by keys, and the finding that is shown. */
 
+import { actionsOf } from './actions.js';
 import { ApiError } from './api.js';
 import { Cutouts } from './cutouts.js';
 import { button, check, choice, el, field, takesKeys } from './dom.js';
@@ -16,7 +17,7 @@ const AHEAD = 2;
 export class Review {
   /**
    * @param {Session} session
-   * @param {Object} app - canWrite, say(text, wrong), shown(finding, fit), changed(), extent(), outlined(), outlines(on), outbox.
+   * @param {Object} app - canWrite, say(text, wrong), shown(finding, fit), changed(), extent(), outlined(), outlines(on), actions(wanted), outbox.
    */
   constructor(session, app) {
     this.session = session;
@@ -43,6 +44,7 @@ export class Review {
     this.conflict = el('div', { class: 'conflict', role: 'alertdialog', 'aria-label': 'Conflict', hidden: true, tabindex: '-1' });
     this.name = el('div', {});
     this.facts = el('div', {});
+    this.demanded = el('div', {});
     this.kind = el('select', { onchange: (event) => this.setKind(event.target.value) });
     this.remark = el('input', {
       type: 'text', maxlength: '2000', placeholder: 'Remark (M); Enter saves', autocomplete: 'off', enterkeyhint: 'done',
@@ -255,7 +257,8 @@ export class Review {
       this.drawn = facts;
       this.cutouts.show(facts);
       this.photos.show(facts);
-      this.facts.replaceChildren(factsOf(facts, survey, survey.severities, this.photos.root, this.app.say));
+      this.showActions();
+      this.facts.replaceChildren(factsOf(facts, survey, survey.severities, this.photos.root, this.demanded, this.app.say));
       this.app.marked(facts);
     }
   }
@@ -272,6 +275,19 @@ export class Review {
     if (facts?.id !== id) return;
     facts.photos = photos;
     this.photos.show(facts);
+  }
+
+  /** Show the actions of the finding as they are now, given those of the tunnel. */
+  takeActions(actions) {
+    const { facts } = this.session;
+    if (!facts || facts.id < 0) return;
+    facts.actions = actions.filter(({ finding_id: id }) => id === facts.id);
+    this.showActions();
+  }
+
+  showActions() {
+    const { facts } = this.session;
+    this.demanded.replaceChildren(...[facts.id > 0 ? actionsOf(facts, this.app.canWrite, this.app.actions) : null].filter(Boolean));
   }
 
   get draftKey() {

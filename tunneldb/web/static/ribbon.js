@@ -2,11 +2,12 @@
 
 import { debounce, el, fitCanvas } from './dom.js';
 import { niceStep, number, percent, station } from './format.js';
+import { fromBest, levelColour } from './levels.js';
 
 const COLOURS = { wet: '#005caf', inspected: '#5d8a6a', probability: '#6a4c93', reviewed: '#3c6e91', axis: '#55626e', line: '#d9dfe4' };
 const AXIS = 16;
 const ROWS = [
-  ['wet', 'Wet area', 1.3], ['findings', 'Findings', 1.3], ['inspected', 'Inspected', 0.8], ['probability', 'Detectability', 1],
+  ['wet', 'Wet area', 1.3], ['findings', 'Findings', 1.3], ['rating', 'Rating', 0.7], ['inspected', 'Inspected', 0.8], ['probability', 'Detectability', 1],
   ['deviation', 'Deviation', 1], ['reviewed', 'Reviewed', 0.7],
 ];
 
@@ -24,6 +25,7 @@ export class Ribbon {
     this.go = go;
     this.data = null;
     this.view = null;
+    this.rating = null;
     this.canvas = el('canvas', {
       tabindex: '0', role: 'slider', 'aria-label': 'Chainage in view', 'aria-orientation': 'horizontal', 'aria-valuemin': '0',
       'aria-valuemax': '0', 'aria-valuenow': '0', data: { keys: '' },
@@ -39,18 +41,31 @@ export class Ribbon {
   show(data, survey) {
     this.data = data;
     this.survey = survey;
-    // A survey without a design has no deviation.
-    this.rows = ROWS.filter(([name]) => name !== 'deviation' || data?.deviation);
-    this.labels.replaceChildren(...this.rows.map(([, text, share]) => {
-      const label = el('span', { text });
-      label.style.flexGrow = share;
-      return label;
-    }));
+    this.arrange();
     this.colours = new Map(survey.finding_kinds.map((kind) => [kind.code, kind]));
     this.canvas.setAttribute('aria-valuemin', survey.from);
     this.canvas.setAttribute('aria-valuemax', survey.to);
     if (!this.tip.hidden) this.tip.textContent = this.describe(this.pointed);
     this.draw();
+  }
+
+  /** Show the results of elements as a band; null shows none. */
+  setRating(rating) {
+    this.rating = rating;
+    if (!this.survey) return;
+    this.arrange();
+    this.draw();
+  }
+
+  /** Choose the rows, and label them: a survey without a design has no deviation. */
+  arrange() {
+    const { data } = this;
+    this.rows = ROWS.filter(([name]) => (name !== 'deviation' || data?.deviation) && (name !== 'rating' || this.rating));
+    this.labels.replaceChildren(...this.rows.map(([, text, share]) => {
+      const label = el('span', { text });
+      label.style.flexGrow = share;
+      return label;
+    }));
   }
 
   /** Mark the stretch in view. */
@@ -117,7 +132,9 @@ export class Ribbon {
   describe(chainage) {
     const { data } = this;
     const parts = [station(chainage, 0)];
-    if (!data?.inspected) return parts[0];
+    const rated = this.rating?.elements.filter((one) => one.chainage_from <= chainage && one.chainage_to > chainage) ?? [];
+    if (rated.length) parts.push(`rated ${fromBest(rated).at(-1).result_text}`);
+    if (!data?.inspected) return parts.join('; ');
     const n = Math.min(Math.max(Math.floor((chainage - data.from) / data.step), 0), data.inspected.length - 1);
     const inspected = data.inspected[n];
     parts.push(inspected === null ? 'inspected: not known' : `inspected ${percent(inspected)}`);
@@ -152,7 +169,8 @@ export class Ribbon {
       const tall = (room * share) / total;
       c.fillStyle = '#f3f5f7';
       c.fillRect(0, y, width, tall);
-      if (this.data && name === 'deviation') this.deviations(c, y, width, tall);
+      if (name === 'rating') this.results(c, y, width, tall);
+      else if (this.data && name === 'deviation') this.deviations(c, y, width, tall);
       else if (this.data) this.row(c, name, y, width, tall);
       y += tall + gap;
     }
@@ -196,6 +214,29 @@ export class Ribbon {
     }
     if (name === 'wet') this.maxima.push([top, `max ${number(most < 1e-6 ? 0 : most, 1, 'm²')}`]);
     if (name === 'findings') this.maxima.push([top, `max ${most < 1 ? 0 : most}`]);
+  }
+
+  /** Draw the results of elements; where zones overlap in chainage, the worst is on top. */
+  results(c, top, width, tall) {
+    const { from, to } = this.survey;
+    const { elements, levels } = this.rating;
+    const x = (at) => Math.round(((Math.min(Math.max(at, from), to) - from) / (to - from)) * width);
+    for (const element of fromBest(elements)) {
+      const left = x(element.chainage_from);
+      const wide = Math.max(x(element.chainage_to) - left, 1);
+      if (element.chainage_to <= from || element.chainage_from >= to) continue;
+      if (element.level === null) {
+        hatch(c, left, top, wide, tall);
+        continue;
+      }
+      c.fillStyle = levelColour(element, levels);
+      c.fillRect(left, top, wide, tall);
+      if (!element.complete) stripe(c, left, top, wide, tall);
+      if (wide > 3) {
+        c.fillStyle = '#fff';
+        c.fillRect(left + wide - 1, top, 1, tall);
+      }
+    }
   }
 
   /** Draw deviations from the middle of a row: inside the design upwards, outside downwards. */
@@ -280,6 +321,23 @@ function maximum(c, text, width, top) {
   c.fillRect(width - wide, top, wide, 12);
   c.fillStyle = COLOURS.axis;
   c.fillText(text, width - 3, top + 1);
+}
+
+/** Draw white stripes over a result that is a lower bound. */
+function stripe(c, x, y, width, height) {
+  c.save();
+  c.beginPath();
+  c.rect(x, y, width, height);
+  c.clip();
+  c.strokeStyle = 'rgba(255,255,255,.85)';
+  c.lineWidth = 1.5;
+  c.beginPath();
+  for (let at = x - height; at < x + width; at += 6) {
+    c.moveTo(at, y + height);
+    c.lineTo(at + height, y);
+  }
+  c.stroke();
+  c.restore();
 }
 
 let pattern = null;
