@@ -12,7 +12,7 @@ import openpyxl
 import psycopg
 import pytest
 from click.testing import CliRunner, Result
-from support.example_change import add_change
+from support.example_change import LATER, add_change, add_change_run
 from support.example_survey import NAME
 
 from tunneldb.cli.main import main
@@ -84,6 +84,20 @@ def test_a_done_action_whose_leak_is_still_wet_is_named(two: list[int], conn: ps
     assert "dry since 2026-05-04" in result.output
     key = max(row[0] for row in rows(conn))
     assert f"done, but wet in a later survey: 1 action ({key})" in result.stderr
+
+
+def test_an_outdated_comparison_is_named(two: list[int], conn: psycopg.Connection, tmp_path: Path) -> None:
+    """The later survey has no results of detection any more."""
+    add_change(conn, NAME)
+    conn.commit()
+    assert "outdated" not in done("actions", "list", "demo").output
+    add_change_run(conn, NAME)
+    conn.commit()
+    message = (
+        f"follow-ups in {LATER} are outdated (one of the surveys has nothing there any more): tunneldb compare {NAME} {LATER}"
+    )
+    assert message in done("actions", "list", "demo").stderr
+    assert message in done("actions", "export", "demo", "-o", str(tmp_path / "list.csv")).stderr
 
 
 @pytest.mark.parametrize(

@@ -263,7 +263,7 @@ def _read(
     survey: str | None,
     moment: dt.datetime | None = None,
 ) -> list[dict[str, Any]]:
-    from tunneldb.store.actions import list_actions
+    from tunneldb.store.actions import list_actions, outdated_comparisons
     from tunneldb.store.catalog import get_tunnel
     from tunneldb.store.survey import get_survey
 
@@ -271,4 +271,7 @@ def _read(
         tunnel_id = get_tunnel(conn, tunnel)
         if survey is not None and get_survey(conn, survey).tunnel_id != tunnel_id:
             raise UserError(f"survey {survey} is not of tunnel {tunnel}")
+        outdated = [] if moment is not None else outdated_comparisons(conn, tunnel_id)
+        for older, newer, reason in (one for one in outdated if survey in (None, one[0])):
+            notify(f"follow-ups in {newer} are outdated ({reason}): tunneldb compare {older} {newer}")
         return list_actions(conn, tunnel_id, states, overdue, survey)

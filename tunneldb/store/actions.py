@@ -42,6 +42,17 @@ def list_actions(
     return conn.cursor(row_factory=dict_row).execute(query, values).fetchall()
 
 
+def outdated_comparisons(conn: psycopg.Connection[Any], tunnel_id: int) -> list[tuple[str, str, str]]:
+    """Return older survey, newer survey and reason of each outdated comparison that follow-ups of actions use."""
+    query = (
+        "SELECT DISTINCT r.older_survey, r.survey, r.reason FROM tunnel_api.result_status r"
+        " WHERE r.stage = 'compare' AND r.stale AND r.survey IN (SELECT s.name FROM tunnel_api.survey s WHERE s.tunnel_id = %s)"
+        " AND r.older_survey IN (SELECT a.survey FROM tunnel_api.action a WHERE a.tunnel_id = %s AND a.finding_id IS NOT NULL)"
+        " ORDER BY 1, 2, 3"
+    )
+    return conn.execute(query, [tunnel_id, tunnel_id]).fetchall()
+
+
 def add_action(conn: psycopg.Connection[Any], survey: str, values: Mapping[str, Any]) -> int:
     """Add an action that a survey demands; return its id.
 
