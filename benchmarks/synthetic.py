@@ -534,6 +534,40 @@ SELECT %(id)s, floor(c / 1000), 'lining', 0.06, 0.02 + 0.04 * random(), 'along',
 FROM generate_series(0, %(kilometres)s * 5000 - 1) AS i, LATERAL (SELECT i / 5.0 AS c, 9 * sin(i) AS a) q
 """
 
+BLOCKS = """
+WITH d AS (INSERT INTO tunnel.element_set (tunnel_id, name, source)
+           SELECT tunnel_id, 'blocks', 'length' FROM tunnel.survey WHERE id = %(id)s RETURNING id)
+INSERT INTO tunnel.element (element_set_id, number, name, chainage_from, chainage_to)
+SELECT d.id, n, 'block ' || n, 10 * n - 10, 10 * n FROM d, generate_series(1, %(kilometres)s * 100) AS n
+"""
+
+SCHEMES = """
+WITH s AS (INSERT INTO tunnel.rating_scheme (name, version, source, results)
+           VALUES ('example', '1', 'benchmark', '{A,B,C,D}'), ('count', '1', 'benchmark', '{A,B,C,D}') RETURNING id, name)
+INSERT INTO tunnel.rating_rule (scheme_id, number, text, kinds, measure, inclusive, limits, results)
+SELECT s.id, r.n, r.text, r.kinds, r.measure, r.inclusive, r.limits, r.results
+FROM s JOIN (VALUES
+    ('example', 1, 'share of wet lining', '{}'::text[], 'share', false, '{0.0005,0.002}'::float8[], '{B,C}'::text[]),
+    ('example', 2, 'severity', '{leak,crack,spall}', 'severity', true, '{2,3,4}', '{B,C,D}'),
+    ('count', 1, 'number of leaks', '{leak}', 'count', true, '{20,40,60}', '{B,C,D}'))
+    AS r (name, n, text, kinds, measure, inclusive, limits, results) ON r.name = s.name
+"""
+
+# Of a hundred wet findings one has an action, in all states and urgencies.
+ACTIONS = """
+INSERT INTO tunnel.action (survey_id, finding_id, chainage_from, chainage_to, arc, measure, urgency, state, due, cost, currency)
+SELECT %(id)s, a.id, a.chainage_from, a.chainage_to, (a.arc_from + a.arc_to) / 2, 'inject',
+    (ARRAY['immediate', 'urgent', 'planned', 'monitor'])[1 + a.id / 100 %% 4],
+    (ARRAY['open', 'ordered', 'done', 'verified', 'open'])[1 + a.id / 100 %% 5], '2025-01-01'::date + (a.id / 100 %% 900)::int,
+    100, 'EUR'
+FROM tunnel.finding a WHERE a.survey_id = %(id)s AND a.wet AND a.id %% 100 = 0
+"""
+
+LIMITS = """
+INSERT INTO tunnel.alarm_limit (tunnel_id, name, quantity, warning, alarm, step)
+SELECT tunnel_id, 'wet', 'wet_area', 1, 5, 50 FROM tunnel.survey WHERE id = %(id)s
+"""
+
 STEPS = {
     "files and ledger": (FILES, RUNS),
     "segments and sections": (SEGMENTS, COUNTED, SECTIONS),
@@ -556,6 +590,7 @@ STEPS = {
     "rings": (RINGS, RING_CHORDS),
     "change until a later survey": (LATER, CHANGE_SECTIONS, CHANGE_REGIONS, LEAK_CHANGES, "ANALYZE tunnel.leak_change"),
     "thickness and evenness": (SURFACES, THICKNESS, EVENNESS, UNEVEN),
+    "elements, schemes, actions, limits": (BLOCKS, SCHEMES, ACTIONS, LIMITS),
 }
 
 

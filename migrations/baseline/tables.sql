@@ -1321,6 +1321,7 @@ COMMENT ON COLUMN tunnel.leak_change.unrolled IS 'Wet area in either survey, in 
 COMMENT ON COLUMN tunnel.leak_change.map IS 'On the map strip beside the axis, tunnel''s SRID, m';
 COMMENT ON COLUMN tunnel.leak_change.surface IS 'On the lining in space, tunnel''s SRID, m';
 CREATE INDEX leak_change_map_idx ON tunnel.leak_change USING gist (map);
+CREATE INDEX leak_change_old_ids_idx ON tunnel.leak_change USING gin (old_ids);
 CREATE INDEX leak_change_old_survey_id_idx ON tunnel.leak_change (old_survey_id);
 CREATE INDEX leak_change_survey_id_old_survey_id_chainage_from_idx ON tunnel.leak_change (survey_id, old_survey_id, chainage_from) INCLUDE (chainage_to, area_old, area_new);
 CREATE INDEX leak_change_survey_id_old_survey_id_state_idx ON tunnel.leak_change (survey_id, old_survey_id, state);

@@ -9,7 +9,7 @@ LANGUAGE sql STABLE STRICT PARALLEL SAFE SECURITY DEFINER ROWS 3 SET search_path
     SELECT s.name, s.date, c.state, c.area_old, c.area_new
       FROM tunnel.leak_change c
       JOIN tunnel.survey s ON s.id = c.survey_id
-     WHERE c.old_survey_id = $1 AND $2 = ANY (c.old_ids) AND s.id NOT IN (SELECT k.survey_id FROM tunnel_internal.survey_copy k)
+     WHERE c.old_survey_id = $1 AND c.old_ids @> ARRAY[$2] AND s.id NOT IN (SELECT k.survey_id FROM tunnel_internal.survey_copy k)
      ORDER BY s.date, s.name
 $$;
 COMMENT ON FUNCTION tunnel_internal.leak_later(int, bigint) IS

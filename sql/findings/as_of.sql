@@ -118,7 +118,7 @@ BEGIN
     END IF;
     SELECT r.* INTO later FROM tunnel_internal.runs_since(survey_key, day) r LIMIT 1;
     IF FOUND THEN
-        RAISE EXCEPTION 'survey % cannot be shown as of %: stage % ran again on %', name, day,
+        RAISE EXCEPTION 'survey % cannot be shown as of %: stage % ran on %', name, day,
             later.stage || coalesce(' of km ' || later.km, ''), later.finished_at
             USING ERRCODE = 'invalid_parameter_value', HINT = 'What it had found before is not stored: take a later moment, or an archive of that time.';
     END IF;

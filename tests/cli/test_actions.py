@@ -12,6 +12,7 @@ import openpyxl
 import psycopg
 import pytest
 from click.testing import CliRunner, Result
+from support.example_change import add_change
 from support.example_survey import NAME
 
 from tunneldb.cli.main import main
@@ -62,6 +63,8 @@ def test_actions_are_added_changed_listed_and_removed(two: list[int], conn: psyc
     assert (shown[1]["state"], shown[1]["responsible"], shown[1]["chainage_from"]) == ("ordered", "Works Ltd", 12310)
     late = done("actions", "list", "demo", "--overdue").output
     assert "2020-03-31, overdue" in late
+    assert f"finding {shown[0]['finding_id']}" in late
+    assert "element block 1" in done("actions", "list", "demo", "--state", "ordered").output
     assert "1200.50 EUR" in late
     assert "Clean" not in late
     assert "not compared" in late
@@ -70,11 +73,25 @@ def test_actions_are_added_changed_listed_and_removed(two: list[int], conn: psyc
     assert [row[0] for row in rows(conn)] == [second]
 
 
+def test_a_done_action_whose_leak_is_still_wet_is_named(two: list[int], conn: psycopg.Connection) -> None:
+    """Leak 2 is dry in the later survey, and leak 3 is as it was."""
+    add_change(conn, NAME)
+    conn.commit()
+    assert "wet in a later survey" not in done("actions", "list", "demo").output
+    for finding in ("2", "3"):
+        done("actions", "add", NAME, "--finding", finding, "--measure", "inject", "--state", "done")
+    result = done("actions", "list", "demo", "--state", "done")
+    assert "dry since 2026-05-04" in result.output
+    key = max(row[0] for row in rows(conn))
+    assert f"done, but wet in a later survey: 1 action ({key})" in result.stderr
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
         (["add", NAME, "--finding", "1"], "--measure is missing"),
         (["add", NAME, "--measure", "x"], "either --finding ID, or --from and --to"),
+        (["add", NAME, "--measure", "x", "--element", "block 1"], "--from and --to, also with --element"),
         (["add", NAME, "--measure", "x", "--finding", "1", "--from", "12+310"], "either --finding ID, or --from and --to"),
         (["add", NAME, "--measure", "x", "--finding", "999999"], "the survey has no finding 999999"),
         (["add", NAME, "--measure", "x", "--finding", "1", "--cost", "12"], "a cost needs its currency"),

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import json
+import re
+import tomllib
 from pathlib import Path
 
 import psycopg
@@ -13,7 +15,11 @@ from support.example_survey import NAME
 
 from tunneldb.cli.main import main
 
-EXAMPLE = Path(__file__).parents[2] / "docs" / "examples" / "rating-example.toml"
+DOCS = Path(__file__).parents[2] / "docs"
+EXAMPLE = DOCS / "examples" / "rating-example.toml"
+PAGE_BLOCKS = re.findall(r"^```toml\n(.*?)^```$", (DOCS / "howto-rating.md").read_text("utf-8"), re.MULTILINE | re.DOTALL)
+PAGE_SCHEMES = {tomllib.loads(block)["name"]: block for block in PAGE_BLOCKS if "[[rule]]" in block}
+"""Schemes of the documentation, by name."""
 
 
 def run(*words: str) -> Result:
@@ -49,6 +55,52 @@ def test_an_owners_scheme_from_end_to_end(dsn: str, example: str, conn: psycopg.
     words = ["--elements", "fifty", "--scheme", "example", "--version", "2026-1", "--json"]
     shown = json.loads(done("rating", "apply", NAME, *words).stdout)
     assert [one["result"] for one in shown["ratings"]] == [row[1] for row in known]
+
+
+def rated_by_the_page(name: str, conn: psycopg.Connection, folder: Path) -> dict[str, dict[str, str]]:
+    """Rate the blocks by a scheme of the page, with a crack of 0.6 mm and 3 m in block 2 and one of severity 3 in block 3."""
+    path = folder / "scheme.toml"
+    path.write_text(PAGE_SCHEMES[name])
+    done("rating", "add", str(path))
+    for severity, line in ((None, "LINESTRING(12355 0, 12358 0)"), (3, "LINESTRING(12408 0, 12409 0)")):
+        conn.execute(
+            "INSERT INTO tunnel_api.finding_unrolled (survey, kind, severity, width_mm, geom)"
+            " VALUES (%s, 'crack', %s, 0.6, %s)",
+            [NAME, severity, line],
+        )
+    conn.commit()
+    written = folder / "rating.csv"
+    done("rating", "apply", NAME, "--elements", "blocks", "--scheme", name, "-o", str(written))
+    return {row["name"]: row for row in csv.DictReader(written.open())}
+
+
+def test_the_page_has_schemes_and_a_template() -> None:
+    assert list(PAGE_SCHEMES) == ["example", "matrix", "points"]
+    assert tomllib.loads(PAGE_BLOCKS[-1])["rating"]["scheme"] in PAGE_SCHEMES
+    given, page = tomllib.loads(EXAMPLE.read_text()), tomllib.loads(PAGE_SCHEMES["example"])
+    rules = {rule["text"]: rule for rule in given["rule"]}
+    assert all(rules[rule["text"]] | rule == rules[rule["text"]] for rule in page["rule"])
+    assert {key: page[key] for key in page if key != "rule"} == {key: given[key] for key in given if key != "rule"}
+
+
+def test_the_matrix_of_the_page(dsn: str, example: str, conn: psycopg.Connection, tmp_path: Path) -> None:
+    """The crack of 3 m has row 3 and column 1, as the page says."""
+    rows = rated_by_the_page("matrix", conn, tmp_path)
+    assert [row["result"] for row in rows.values()] == ["0", "1", "1", "0"]
+    assert rows["block 2"]["why"].startswith("Width and length of cracks: 0.6 and 0.00")
+    shown = done("rating", "show", "matrix").output
+    assert "width_mm ≥ 0.2, 0.5 × density_length > 0.01, 0.05: 0 0 1 | 0 1 2 | 1 2 3" in " ".join(shown.split())
+
+
+def test_the_points_of_the_page(dsn: str, example: str, conn: psycopg.Connection, tmp_path: Path) -> None:
+    """Block 3 has 3.8 m² of wet area and more, and severity 3; growth is unknown, and the remark says so."""
+    rows = rated_by_the_page("points", conn, tmp_path)
+    assert [row["result"] for row in rows.values()] == ["fair", "good", "poor", "good"]
+    assert rows["block 3"]["why"].startswith("60 points: Wet area 40 (")
+    assert rows["block 1"]["remark"] == "80 % inspected; growth unknown: no earlier inspection"
+    assert {row["complete"] for row in rows.values()} == {"False"}
+    shown = done("rating", "apply", NAME, "--elements", "blocks", "--scheme", "points").output
+    assert "less than 95 % was inspected, now or in the earlier inspection (remark): 4 elements" in shown
 
 
 def test_lists_and_removal(dsn: str, example: str, conn: psycopg.Connection) -> None:

@@ -30,7 +30,7 @@ from tunneldb.cli.main import main
 from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.export.tables.finding_counts import DARK, LEAKS, OTHERS, UNCOUNTED
-from tunneldb.report import findings
+from tunneldb.report import actions, findings
 from tunneldb.report.change import CHANGE_WORDS
 from tunneldb.report.owner import CHAPTERS, Owner, read_owner
 from tunneldb.report.pictures import trouble
@@ -352,8 +352,8 @@ def test_an_owners_template(drawn: str, folder: Path, tmp_path: Path) -> None:
     assert re.findall(r'<section id="(\w+)"(?! class="kind)', text) == ["findings", "leaks", "sheets", "dry", "signatures"]
     left_out = re.findall(r"in diesem Bericht nicht enthalten:(.*)</p>", text)[0]
     assert [name.strip() for name in left_out.split(",")] == [
-        "Zusammenfassung", "Erfasste Auskleidung", "Auskleidung", "Querschnitte", "Statistik", "Lichtraum", "Ringe",
-        "Verfahren", "Prüfungen",
+        "Zusammenfassung", "Maßnahmen", "Erfasste Auskleidung", "Auskleidung", "Querschnitte", "Statistik", "Lichtraum",
+        "Ringe", "Verfahren", "Prüfungen",
     ]  # fmt: skip
     for said in ("<h2>Spalt</h2>", "<dd>Bahn &amp; Söhne</dd>", "<h2>Unterschriften</h2>", "--severity: #123456", 'lang="de"'):
         assert said in text
@@ -531,7 +531,7 @@ def example_catalogue() -> frozenset[str]:
     """Texts of templates and scripts, and those that are put together: states, origins, kinds, …"""
     package = Path(findings.__file__).parent
     texts = set(CHAPTERS.values()) | set(findings.STATE_WORDS.values()) | {"detected", "redrawn", "split", "merged"}
-    texts |= {LEAKS, OTHERS, DARK}
+    texts |= {LEAKS, OTHERS, DARK, *actions.STATES, *actions.URGENCIES, *actions.FOLLOW_UP.values(), "same"}
     texts |= set(CHANGE_WORDS.values()) | {"Chainage", "Station", "o’clock", "m²", "Client", "Project"}
     texts |= {"Prepared by", "Checked by", "Accepted by", "Name", "Position", "Date", "Signature"}
     texts |= {value for name, value in vars(trouble).items() if name.isupper()}

@@ -29,6 +29,7 @@ def body(path: Path) -> str:
     """Return a report without what names its moment."""
     text = re.sub(r'<script type="application/json" id="record">.*?</script>', "", path.read_text())
     text = re.sub(r"<p class=\"warning\">The survey as it was on [^<]*</p>", "", text)
+    text = text.replace("Actions of earlier surveys are not included.", "")
     return " ".join(re.sub(r"\d{4}-\d\d-\d\d \d\d:\d\d(:\d\d)?", "TIME", text).split())
 
 

@@ -248,7 +248,7 @@ def test_what_a_later_detection_replaced_is_not_shown(conn: psycopg.Connection, 
         [NAME],
     )
     conn.commit()
-    with pytest.raises(psycopg.Error, match=r"cannot be shown as of .*: stage detect of km 12 ran again on"):
+    with pytest.raises(psycopg.Error, match=r"cannot be shown as of .*: stage detect of km 12 ran on"):
         conn.execute("SELECT tunnel_api.show_as_of(%s, %s)", [NAME, moment])
 
 

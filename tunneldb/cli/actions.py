@@ -110,19 +110,22 @@ def list_(
     rows = _read(settings, tunnel, states, overdue, survey, moment)
     add_to_json(tunnel=tunnel, actions=rows)
     print_table(
-        ["id", "place", "finding", "measure", "urgency", "responsible", "due", "cost", "state", "follow-up"],
+        ["id", "place", "subject", "measure", "urgency", "responsible", "due", "cost", "state", "follow-up"],
         [
             (
-                row["id"], row["label"], row["finding_id"] or row["element"] or "", row["measure"], row["urgency"],
+                row["id"], row["label"], _subject(row), row["measure"], row["urgency"],
                 row["responsible"] or "", f"{row['due']}, overdue" if row["overdue"] else row["due"] or "",
                 f"{row['cost']} {row['currency']}" if row["cost"] is not None else "", row["state"], row["follow_up"] or "",
             )
             for row in rows
         ],
-        right=(0, 2, 7),
+        right=(0, 7),
     )  # fmt: skip
     late = sum(bool(row["overdue"]) for row in rows)
     notify(f"{counted(len(rows), 'action')}, {late} overdue")
+    wet = [str(row["id"]) for row in rows if row["state"] in ("done", "verified") and _is_wet(row["follow_up"])]
+    if wet:
+        notify(f"done, but wet in a later survey: {counted(len(wet), 'action')} ({', '.join(wet)})")
 
 
 @actions.command(
@@ -133,7 +136,7 @@ def list_(
 )
 @click.argument("survey")
 @click.option("--finding", "finding_id", type=int, metavar="ID", help="Finding that it is about; gives its place.")
-@click.option("--element", metavar="NAME", help="Name of the element that it is about.")
+@click.option("--element", metavar="NAME", help="Name of the element that it is about; --from and --to give its place.")
 @stretch_options
 @_given
 @click.pass_obj
@@ -155,7 +158,7 @@ def add(
     if not values.get("measure"):
         raise UserError("--measure is missing: what is to be done")
     if (finding_id is None) == (start is None and end is None):
-        raise UserError("give either --finding ID, or --from and --to")
+        raise UserError("give either --finding ID, or --from and --to, also with --element")
     with connect(settings.dsn) as conn:
         found = get_survey(conn, survey)
         values |= {"finding_id": finding_id, "element": element}
@@ -238,6 +241,18 @@ def import_(settings: Settings, tunnel: str, file: Path) -> None:
         done = read_actions(conn, get_tunnel(conn, tunnel), file)
     add_to_json(tunnel=tunnel, added=done.added, changed=done.changed, unchanged=done.unchanged)
     notify(f"{done.added} added, {done.changed} changed, {done.unchanged} unchanged")
+
+
+def _is_wet(follow_up: str | None) -> bool:
+    """Return True if a leak is still wet in a later survey."""
+    return (follow_up or "").startswith(("grown ", "same ", "shrunk "))
+
+
+def _subject(row: dict[str, Any]) -> str:
+    """Return the finding or element of an action as text; an element's name can be a number, too."""
+    if row["finding_id"] is not None:
+        return f"finding {row['finding_id']}"
+    return f"element {row['element']}" if row["element"] else ""
 
 
 def _read(

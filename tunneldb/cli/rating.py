@@ -193,8 +193,10 @@ def apply(
     if unrated:
         notify(f"not rated, because nothing was inspected: {counted(unrated, 'element')}")
     if partial:
-        share = f"{100 * found['min_inspected']:g} %"
-        notify(f"a lower bound, because less than {share} was inspected: {counted(partial, 'element')}")
+        reason = f"less than {100 * found['min_inspected']:g} % was inspected"
+        if any("growth unknown" in (row["remark"] or "") for row in rows):
+            reason += ", now or in the earlier inspection (remark)"
+        notify(f"a lower bound, because {reason}: {counted(partial, 'element')}")
     say_written(files)
 
 

@@ -105,8 +105,9 @@ def _shown(value: Any) -> str:
 
 
 def stamped(row: dict[str, Any]) -> dict[str, Any]:
-    """Return a row of a list as it is written: times in UTC, to the microsecond, as text."""
-    return row | {name: _stamp(row[name]) for name in ("added_at", "changed_at")}
+    """Return a row of a list as it is written: times in UTC, to the microsecond, as text; lengths to the micrometre."""
+    lengths = {name: None if row[name] is None else round(row[name], 6) for name in (*_NUMBERS, "arc")}
+    return row | lengths | {name: _stamp(row[name]) for name in ("added_at", "changed_at")}
 
 
 def _stamp(moment: dt.datetime | None) -> str | None:

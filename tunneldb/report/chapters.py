@@ -10,6 +10,7 @@ import numpy as np
 from tunneldb.export.tables.section_dimensions import dimension_rows
 from tunneldb.raster.gap_fill import FILL_NOTE
 from tunneldb.report import data, text
+from tunneldb.report.actions import STATES
 from tunneldb.report.change import CHANGE_WORDS, read_change
 from tunneldb.report.clearance import read_clearance
 from tunneldb.report.deviation import read_deviation
@@ -155,6 +156,18 @@ class Rating(_Found):
     def differences(self) -> list[Difference]:
         """Schemes that rate the same elements, and where they differ."""
         return differences(self.facts.ratings)
+
+
+class Actions(_Found):
+    """Actions that this inspection and earlier ones demand."""
+
+    name, style = "actions", "rating.css"
+    states = STATES
+
+    @property
+    def found(self) -> Any:
+        """Actions; None without any."""
+        return self.facts.actions if self.facts.actions.rows else None
 
 
 class Seen(_OfLeaks):
@@ -400,8 +413,8 @@ class Signatures(Chapter):
 ALL: dict[str, type[Chapter]] = {
     chapter.name: chapter
     for chapter in (
-        Summary, Rating, Seen, Classes, Lining, Sections, Leaks, Statistics, Findings, Dry, Structures, Underwater, Clearance,
-        Rings, Change, Deviation, Methods, Reviews, Signatures,
+        Summary, Rating, Actions, Seen, Classes, Lining, Sections, Leaks, Statistics, Findings, Dry, Structures, Underwater,
+        Clearance, Rings, Change, Deviation, Methods, Reviews, Signatures,
     )
 }  # fmt: skip
 """All chapters by name, in their default order."""

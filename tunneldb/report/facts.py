@@ -12,6 +12,7 @@ import numpy as np
 import psycopg
 
 from tunneldb.report import data, text
+from tunneldb.report.actions import Actions, digest_actions, read_actions
 from tunneldb.report.data import CoverageBins, Leak
 from tunneldb.report.drawing import step_for, ticks
 from tunneldb.report.findings import FindingsChapter, digest_findings, read_findings_chapter
@@ -177,6 +178,11 @@ class Facts:
         )  # fmt: skip
 
     @cached_property
+    def actions(self) -> Actions:
+        """Actions; in a report of the past those of the survey itself, because only its own edits are reverted."""
+        return read_actions(self.conn, self.survey, self.low, self.high, not self.request.past)
+
+    @cached_property
     def total(self) -> dict[str, Any]:
         """Statistics of the whole stretch."""
         return data.read_statistics(self.conn, self.survey, [self.low], [self.high])[0]
@@ -215,6 +221,7 @@ class Facts:
         if self.structures:
             digest_spots(digest, self.structures)
         digest_ratings(digest, self.ratings)
+        digest_actions(digest, self.actions, self.survey)
         return digest.hexdigest()[:16]
 
     def labels(self, chainages: list[float]) -> list[str]:

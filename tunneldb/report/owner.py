@@ -17,6 +17,7 @@ from tunneldb.tomlfile import read_toml
 CHAPTERS = {
     "summary": "Summary",
     "rating": "Rating",
+    "actions": "Actions",
     "seen": "Inspected lining",
     "classes": "Waterproofing",
     "lining": "Lining",

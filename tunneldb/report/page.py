@@ -19,6 +19,7 @@ from tunneldb.export.tables.finding_counts import ORIGINS, SEVERITIES, STATES, U
 from tunneldb.export.tables.leaks import clock_label
 from tunneldb.finding_kind import REVIEW_COLOURS
 from tunneldb.report import data, text
+from tunneldb.report.actions import follow_up_text
 from tunneldb.report.chapters import ALL
 from tunneldb.report.facts import Facts, Request, digest_spots
 from tunneldb.report.findings import STATE_WORDS
@@ -159,7 +160,12 @@ def _template(name: str, owner: Owner) -> jinja2.Template:
     environment.globals |= {"_": owner.words, "owner": owner}
     environment.globals |= {"origins": ORIGINS, "severities": SEVERITIES, "uncounted": UNCOUNTED, "said": STATE_WORDS}
     environment.globals |= {"review_colours": REVIEW_COLOURS}
-    environment.globals |= {"headline": headline, "name_elements": name_elements, "result_text": result_text}
+    environment.globals |= {
+        "headline": headline,
+        "name_elements": name_elements,
+        "result_text": result_text,
+        "follow_up": follow_up_text,
+    }
     return environment.get_template(name)
 
 

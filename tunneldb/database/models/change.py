@@ -132,6 +132,7 @@ class LeakChange(Base):
         Index(None, "survey_id", "old_survey_id", "chainage_from", postgresql_include=["chainage_to", "area_old", "area_new"]),
         Index(None, "survey_id", "old_survey_id", "state"),
         Index(None, "old_survey_id"),
+        Index(None, "old_ids", postgresql_using="gin"),
         Index(None, "unrolled", postgresql_using="gist"),
         Index(None, "map", postgresql_using="gist"),
         {"comment": "What became of leaks between two surveys: those that touch each other are one group"},
