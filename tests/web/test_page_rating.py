@@ -185,16 +185,16 @@ def test_a_change_of_another_person_is_not_written_over(page: Page, database: ps
     key = add(database)
     panel = tab(page, "Actions")
     panel.get_by_role("button", name=f"Change action {key}").click()
-    database.execute("UPDATE tunnel_api.action SET state = 'ordered' WHERE id = %s", [key])
+    database.execute("UPDATE tunnel_api.action SET state = 'ordered', remark = 'at night' WHERE id = %s", [key])
     form = panel.get_by_role("form", name=f"Action {key}")
     form.get_by_label("State").select_option("verified")
     form.get_by_role("button", name="Save").click()
     expect(form.get_by_role("alert")).to_contain_text(f"has changed action {key} in the meantime; nothing was written")
-    expect(form.get_by_role("alert")).to_contain_text("In the database: ordered, planned")
+    expect(form.get_by_role("alert")).to_contain_text("nothing was written. In the database: ordered, planned, at night")
     assert stored(database)[0]["state"] == "ordered"
     form.get_by_role("button", name="Save").click()
     expect(panel).to_contain_text("0 of 1 actions")
-    assert stored(database)[0]["state"] == "verified"
+    assert (stored(database)[0]["state"], stored(database)[0]["remark"]) == ("verified", "at night")
     forgive(page, "status of 409")
 
 

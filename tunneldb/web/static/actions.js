@@ -144,9 +144,11 @@ export class ActionsPanel {
         if (!(error instanceof ApiError || error instanceof RangeError)) throw error;
         wrong.textContent = `Not saved. ${error.message}`;
         if (error.data?.action) {
-          // The next attempt is one of a person who has seen the other values.
-          action = error.data.action;
-          wrong.textContent += ` In the database: ${nowText(action)}. Save again to write yours, or cancel.`;
+          // The next attempt is one of a person who has seen the other values; what this person has not touched becomes as it is now.
+          const now = error.data.action;
+          for (const name of untouched(inputs, action)) inputs[name].value = now[name] ?? (name === 'currency' ? 'EUR' : '');
+          action = now;
+          wrong.textContent += `. In the database: ${nowText(now)}. Save again to write yours, or cancel.`;
         }
       }
       save.disabled = false;
@@ -230,6 +232,12 @@ function writtenBy({ id, added_by: by, added_at: at, changed_by: last, changed_a
 
 function nowText({ state, urgency, responsible, due, cost, currency, remark }) {
   return [state, urgency, responsible, due ? `due ${due}` : null, cost === null ? null : `${cost} ${currency}`, remark].filter(Boolean).join(', ');
+}
+
+/** Return the names of the inputs that are as the action was. */
+function untouched(inputs, action) {
+  const values = valuesOf(inputs);
+  return Object.keys(values).filter((name) => values[name] === action[name]);
 }
 
 /** Return the values of a form; throw RangeError with a sentence if one is not valid. */
