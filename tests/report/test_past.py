@@ -113,7 +113,7 @@ def test_a_stage_that_ran_since_leaves_it_open(signed: tuple[Path, datetime], co
         [NAME],
     )
     conn.commit()
-    assert "stage detect of km 12 ran again" in run("report", "--verify", path, code=5).output
+    assert "stage detect of km 12 ran on" in run("report", "--verify", path, code=5).output
     refused = run("report", NAME, "-o", tmp_path / "then.html", "--as-of", moment.isoformat(), code=2).output
     assert "take a later moment, or an archive of that time" in refused
     assert not (tmp_path / "then.html").exists()

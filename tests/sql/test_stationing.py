@@ -202,6 +202,7 @@ def test_labels_of_every_view_are_stations(conn: psycopg.Connection, example: st
     inner = "SELECT survey_id, n, geom FROM tunnel.axis_vertex ORDER BY n OFFSET 2 LIMIT 7"
     conn.execute(f"INSERT INTO tunnel.pose (survey_id, time, geom) {inner}")
     conn.execute(f"INSERT INTO tunnel.station {inner}")
+    conn.execute("UPDATE tunnel.alarm_limit SET chainage_from = 12310, chainage_to = 12400")
     views = labelled_views(conn)
     seen = set()
     for equations in (OWN, []):

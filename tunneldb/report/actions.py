@@ -1,4 +1,4 @@
-"""The chapter on actions: what this inspection and earlier ones demand, and what became of their leaks since."""
+"""The chapter on actions: what this inspection and earlier ones demand, and the state of their leaks since."""
 
 from __future__ import annotations
 
