@@ -36,6 +36,7 @@ from tunneldb.report.owner import CHAPTERS, Owner, read_owner
 from tunneldb.report.pictures import trouble
 from tunneldb.report.pictures.load import Source
 from tunneldb.report.words import english_texts, languages, plural_forms, read_language
+from tunneldb.store.coverage import GAP_STATES
 from tunneldb.store.dry_regions import read_dry_regions
 from tunneldb.store.survey import get_survey
 
@@ -532,13 +533,14 @@ def example_catalogue() -> frozenset[str]:
     package = Path(findings.__file__).parent
     texts = set(CHAPTERS.values()) | set(findings.STATE_WORDS.values()) | {"detected", "redrawn", "split", "merged"}
     texts |= {LEAKS, OTHERS, DARK, *actions.STATES, *actions.URGENCIES, *actions.FOLLOW_UP.values(), "same"}
+    texts |= set(GAP_STATES) | {"Not searched for leaks: {stretches}", "Searched, with gaps: {stretches}"}
     texts |= set(CHANGE_WORDS.values()) | {"Chainage", "Station", "o’clock", "m²", "Client", "Project"}
     texts |= {"Prepared by", "Checked by", "Accepted by", "Name", "Position", "Date", "Signature"}
     texts |= {value for name, value in vars(trouble).items() if name.isupper()}
     baseline = (Path(__file__).parents[2] / "migrations" / "baseline" / "finding.sql").read_text("utf-8")
     texts |= set(re.findall(r"^    \('\w+', '([^']+)', '{", baseline, re.MULTILINE))
     texts |= set(re.findall(r"^    \(\d, '(\w+)',", baseline, re.MULTILINE))
-    for path in [*(package / "templates").rglob("*.*"), package / "strip.py", package / "rating.py"]:
+    for path in [*(package / "templates").rglob("*.*"), package / "strip.py", package / "rating.py", package / "gaps.py"]:
         text = path.read_text("utf-8")
         texts |= set(re.findall(r'(?<![\w.])(?:_|self\.words|words)(?:\.count)?\(\s*"([^"]+)"', text))
         if path.suffix == ".js":

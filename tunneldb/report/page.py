@@ -23,6 +23,7 @@ from tunneldb.report.actions import follow_up_text
 from tunneldb.report.chapters import ALL
 from tunneldb.report.facts import Facts, Request, digest_spots
 from tunneldb.report.findings import STATE_WORDS
+from tunneldb.report.gaps import gaps_statement
 from tunneldb.report.leak_table import leak_table
 from tunneldb.report.lining import Form
 from tunneldb.report.owner import Owner
@@ -165,6 +166,7 @@ def _template(name: str, owner: Owner) -> jinja2.Template:
         "name_elements": name_elements,
         "result_text": result_text,
         "follow_up": follow_up_text,
+        "gaps_statement": gaps_statement,
     }
     return environment.get_template(name)
 
