@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 import tomllib
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
-from tunneldb.errors import InputError
+from tunneldb.errors import InputError, did_you_mean
 from tunneldb.files import require_at_most
 
 MAX_MEGABYTES = 1
@@ -44,3 +45,30 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
         raise InputError(f"{path}: is not TOML: {error}") from error
     except RecursionError:
         raise InputError(f"{path}: its lists are nested too deep") from None
+
+
+@dataclass(frozen=True)
+class TomlTable:
+    """Table of a TOML file; errors are reported with the file, the place in it and the key.
+
+    Attributes
+    ----------
+    path : Path
+    values : dict
+    place : str
+        Place of the table in the file, as ``rule 2: ``; empty for the whole file.
+    """
+
+    path: Path
+    values: dict[str, Any]
+    place: str = ""
+
+    def refuse(self, key: str, reason: str) -> NoReturn:
+        """Raise InputError for a key."""
+        raise InputError(f"{self.path}: {self.place}{key}: {reason}")
+
+    def refuse_others(self, known: tuple[str, ...]) -> None:
+        """Raise InputError for a key that is not known."""
+        for key in self.values:
+            if key not in known:
+                self.refuse(key, f"there is no such key{did_you_mean(key, known)}; there are {', '.join(known)}")

@@ -5,14 +5,13 @@ from __future__ import annotations
 import datetime as dt
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 from tunneldb.csvfile import find_column, read_csv, read_header, read_texts
 from tunneldb.errors import InputError, did_you_mean
 from tunneldb.store.rating import MEASURES, Element, Limits, Rule, Scheme, Totals
-from tunneldb.tomlfile import read_toml
+from tunneldb.tomlfile import TomlTable, read_toml
 
 SCHEME_KEYS = ("name", "version", "source", "valid_from", "results", "min_inspected", "totals", "rule")
 AXIS_KEYS = ("kinds", "measure", "above", "from")
@@ -80,7 +79,7 @@ def read_scheme(path: Path) -> Scheme:
     InputError
         If the file cannot be read, or a key is unknown, missing or wrong; with the key.
     """
-    given = _Given(path, "", read_toml(path, "a rating scheme"))
+    given = _Given(path, read_toml(path, "a rating scheme"))
     given.refuse_others(SCHEME_KEYS)
     results = given.texts("results")
     if len(set(results)) != len(results) or not 2 <= len(results) <= 20:
@@ -99,8 +98,8 @@ def read_scheme(path: Path) -> Scheme:
         given.refuse("totals", "a part [totals] with above or from = {RESULT = SUM, …}")
     return Scheme(
         given.text("name"), given.text("version"), given.text("source"), valid_from, results, float(share),
-        tuple(_rule(_Given(path, f"rule {n}: ", rule), results, totals is not None) for n, rule in enumerate(rules, start=1)),
-        None if totals is None else _totals(_Given(path, "totals: ", totals), results),
+        tuple(_rule(_Given(path, rule, f"rule {n}: "), results, totals is not None) for n, rule in enumerate(rules, start=1)),
+        None if totals is None else _totals(_Given(path, totals, "totals: "), results),
     )  # fmt: skip
 
 
@@ -114,7 +113,7 @@ def _rule(given: _Given, results: Sequence[str], summed: bool) -> Rule:
         by = given.values["by"]
         if summed or not isinstance(by, dict):
             given.refuse("by", "{measure = …, above or from = […]}, in a scheme without [totals]")
-        columns = _Given(given.path, f"{given.place}by: ", by)
+        columns = _Given(given.path, by, f"{given.place}by: ")
         columns.refuse_others(AXIS_KEYS)
         axis, other = _axis(given), _axis(columns)
         return Rule(text, axis, _cells(given, results, len(axis.limits) + 1, len(other.limits) + 1), by=other)
@@ -203,21 +202,8 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
-@dataclass(frozen=True)
-class _Given:
-    """Table of a file; errors are reported with the file's name, the place and the key."""
-
-    path: Path
-    place: str
-    values: dict[str, Any]
-
-    def refuse(self, key: str, reason: str) -> NoReturn:
-        raise InputError(f"{self.path}: {self.place}{key}: {reason}")
-
-    def refuse_others(self, known: tuple[str, ...]) -> None:
-        for key in self.values:
-            if key not in known:
-                self.refuse(key, f"there is no such key{did_you_mean(key, known)}; there are {', '.join(known)}")
+class _Given(TomlTable):
+    """Table of a rating scheme."""
 
     def text(self, key: str) -> str:
         value = self.values.get(key)

@@ -6,13 +6,12 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
-from tunneldb.errors import InputError
 from tunneldb.finding_kind import SEVERITY_COLOURS
 from tunneldb.report.pictures.load import Source, load_pictures
 from tunneldb.report.words import ENGLISH, ENGLISH_PLURAL, Words, english_texts, languages, plural_forms, read_language
-from tunneldb.tomlfile import read_toml
+from tunneldb.tomlfile import TomlTable, read_toml
 
 CHAPTERS = {
     "summary": "Summary",
@@ -142,20 +141,8 @@ def read_owner(path: Path) -> Owner:
     )
 
 
-@dataclass(frozen=True)
-class _Given:
-    """Settings file; errors are reported with the file's name, the key and the value."""
-
-    path: Path
-    values: dict[str, Any]
-
-    def refuse(self, key: str, reason: str) -> NoReturn:
-        raise InputError(f"{self.path}: {key}: {reason}")
-
-    def refuse_others(self, known: tuple[str, ...]) -> None:
-        for key in self.values:
-            if key not in known:
-                self.refuse(key, f"unknown key; known are {', '.join(known)}")
+class _Given(TomlTable):
+    """Settings of a template."""
 
     def text(self, key: str) -> str | None:
         value = self.values.get(key)
@@ -247,14 +234,13 @@ def _ratings(given: _Given) -> tuple[RatingRequest, ...]:
         given.refuse("rating", f"must be a table [rating] or several [[rating]], not {tables!r}")
     ratings = []
     for number, table in enumerate(tables, start=1):
-        one = _Given(given.path, {f"rating {number}, {key}": value for key, value in table.items()})
-        keys = {key: f"rating {number}, {key}" for key in _RATING_KEYS}
-        one.refuse_others(tuple(keys.values()))
-        scheme, version, elements = (one.text(key) for key in keys.values())
+        one = _Given(given.path, table, f"rating {number}: ")
+        one.refuse_others(_RATING_KEYS)
+        scheme, version, elements = (one.text(key) for key in _RATING_KEYS)
         if scheme is None:
-            given.refuse(keys["scheme"], "is missing: the name of a scheme (tunneldb rating list)")
+            one.refuse("scheme", "is missing: the name of a scheme (tunneldb rating list)")
         if elements is None:
-            given.refuse(keys["elements"], "is missing: the name of a division of the tunnel (tunneldb elements list)")
+            one.refuse("elements", "is missing: the name of a division of the tunnel (tunneldb elements list)")
         ratings.append(RatingRequest(scheme, version, elements))
     return tuple(ratings)
 
