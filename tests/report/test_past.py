@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import time
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path
 
 import psycopg
@@ -72,6 +72,8 @@ def test_a_report_as_of_a_moment_is_the_one_that_was_written_then(
     assert body(now) != body(path)
     assert body(then) == body(path)
     assert "The survey as it was on" in then.read_text()
+    stated = f"{moment.astimezone(UTC):%Y-%m-%d %H:%M} UTC"
+    assert f"as of {stated}" in then.read_text(), "the statement that is signed"
     assert "The survey as it was on" not in path.read_text()
 
 
