@@ -88,7 +88,7 @@ def as_of(connection: psycopg.Connection[Any], survey: str, moment: dt.datetime 
     Raises
     ------
     UserError
-        If the survey cannot be shown as it was: it is younger, or a stage ran since; or the role is not an inspector's.
+        If the survey cannot be shown as it was: it is younger, or a stage ran since.
     """
     if moment is None:
         with snapshot(connection):
@@ -103,8 +103,6 @@ def as_of(connection: psycopg.Connection[Any], survey: str, moment: dt.datetime 
         except (psycopg.errors.InvalidParameterValue, psycopg.errors.NoDataFound) as error:
             hint = f" {error.diag.message_hint}" if error.diag.message_hint else ""
             raise UserError(f"{error.diag.message_primary}.{hint}") from None
-        except psycopg.errors.InsufficientPrivilege:
-            raise UserError("the past of a survey needs role tunnel_inspector: GRANT tunnel_inspector TO …") from None
         yield moment
 
 
