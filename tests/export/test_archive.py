@@ -108,7 +108,8 @@ def views(conn: psycopg.Connection, survey: str, *, exact: bool) -> Rows:
     ).fetchall()
     found: Rows = {}
     for view, columns, types in listed:
-        if "survey" not in columns or view in ("change", "survey_size"):  # bytes on the disk are no rows
+        # bytes on the disk are no rows; schemes of ratings are the owner's, not the survey's
+        if "survey" not in columns or view in ("change", "survey_size") or view.startswith("rating_"):
             continue
         kept = [
             sql.SQL("round({}::numeric, 9)").format(sql.Identifier(c)) if t == "double precision" and view != "point"

@@ -32,7 +32,8 @@ HOSTILE = {
 TEXTS = {
     *("label", "label_from", "label_to", "kind", "kind_label", "kind_detected", "severity_label", "state", "review", "class"),
     *("survey", "old_survey", "member", "member_kind", "gauge", "track", "profile", "layer", "name", "class_name", "part"),
-    *("side", "source", "direction", "edited_by", "drawn_by"),
+    *("side", "source", "direction", "edited_by", "drawn_by", "measure", "responsible", "urgency", "follow_up", "why"),
+    *("scheme", "version", "result_text"),
 }
 """Columns of text in map tips."""
 

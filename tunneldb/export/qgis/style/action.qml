@@ -502,6 +502,6 @@
     </attributeEditorContainer>
   </attributeEditorForm>
   <previewExpression>"id" || ' ' || "measure"</previewExpression>
-  <mapTip>&lt;b&gt;[% replace("measure", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]&lt;/b&gt;, [% replace("label", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]&lt;br&gt;[% "urgency" %], [% "state" %][% if("overdue", ', &lt;b&gt;overdue&lt;/b&gt;', '') %][% coalesce('&lt;br&gt;due ' || format_date("due", 'yyyy-MM-dd'), '') %][% coalesce('&lt;br&gt;' || replace("responsible", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')), '') %][% coalesce('&lt;br&gt;since then: ' || "follow_up", '') %][% coalesce('&lt;br&gt;' || replace("remark", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')), '') %]</mapTip>
+  <mapTip>&lt;b&gt;[% replace("measure", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]&lt;/b&gt;, [% replace("label", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]&lt;br&gt;[% replace("urgency", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %], [% replace("state", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %][% if("overdue", ', &lt;b&gt;overdue&lt;/b&gt;', '') %][% coalesce('&lt;br&gt;due ' || format_date("due", 'yyyy-MM-dd'), '') %][% coalesce('&lt;br&gt;' || replace("responsible", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')), '') %][% coalesce('&lt;br&gt;since then: ' || replace("follow_up", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')), '') %][% coalesce('&lt;br&gt;' || replace("remark", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')), '') %]</mapTip>
   <layerGeometryType>0</layerGeometryType>
 </qgis>
