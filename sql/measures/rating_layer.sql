@@ -17,7 +17,8 @@ LANGUAGE sql STABLE STRICT PARALLEL SAFE SECURITY DEFINER SET search_path = pg_c
         SELECT array_agg(r.point ORDER BY r.place) AS points FROM ring r WHERE r.point IS NOT NULL
     )
     SELECT CASE WHEN cardinality(l.points) > 3
-                THEN public.ST_MakePolygon(public.ST_MakeLine(l.points || l.points[1])) END FROM line l
+                THEN public.ST_MakePolygon(public.ST_MakeLine(l.points || l.points[1])) END
+      FROM line l WHERE tunnel_internal.in_order($4, $5)
 $$;
 COMMENT ON FUNCTION tunnel_internal.map_box(int, float8, float8, float8, float8) IS
 'Rectangle between two chainages and two arcs (m) on the map strip, in the tunnel''s SRID; NULL if the survey has no axis there';

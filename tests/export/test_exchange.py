@@ -30,7 +30,8 @@ CURVE, CENTRE = 300.0, np.array([500_300.0, 4_640_000.0])  # of its axis, in pla
 FIRST, LAST = 12300.0, 12500.0
 UNROLLED = {
     *("leak_unrolled", "dark_unrolled", "region", "section_unrolled", "sheet", "chainage_unrolled", "lining_unrolled"),
-    "action_unrolled", "coverage_gap", "dark_band", "detectability", "finding_point_unrolled", "finding_line_unrolled", "finding_area_unrolled",
+    "action_unrolled", "coverage_gap", "dark_band", "detectability", "finding_point_unrolled", "finding_line_unrolled",
+    "finding_area_unrolled",
 }  # fmt: skip
 PYTHON = "/usr/bin/python3"
 ENVIRONMENT = {**os.environ, "QT_QPA_PLATFORM": "offscreen", "LC_ALL": "C.UTF-8", "PYTHONPATH": ""}
