@@ -11,28 +11,9 @@ from typing import Any
 import openpyxl
 import psycopg
 import pytest
-from click.testing import CliRunner, Result
+from support.command import command, refused
 from support.example_change import LATER, add_change, add_change_run
 from support.example_survey import NAME
-
-from tunneldb.cli.main import main
-
-
-def run(*words: str) -> Result:
-    return CliRunner().invoke(main, list(words))
-
-
-def done(*words: str) -> Result:
-    result = run(*words)
-    assert result.exit_code == 0, result.output
-    return result
-
-
-def refused(*words: str) -> str:
-    result = run(*words)
-    assert result.exit_code == 2, result.output
-    assert "Traceback" not in result.output
-    return result.output.strip()
 
 
 @pytest.fixture
@@ -42,8 +23,10 @@ def two(dsn: str, example: str, conn: psycopg.Connection) -> list[int]:
     conn.commit()
     (leak,) = conn.execute("SELECT min(id) FROM tunnel_api.finding WHERE survey = %s AND wet AND counted", [NAME]).fetchone()  # type: ignore[misc]
     words = ["--measure", "Inject the joint", "--urgency", "urgent", "--due", "2020-03-31", "--cost", "1200.50 EUR"]
-    done("actions", "add", NAME, "--finding", str(leak), *words)
-    done("actions", "add", NAME, "--from", "12+310", "--to", "12+320", "--measure", "=Clean the drain", "--element", "block 1")
+    command("actions", "add", NAME, "--finding", str(leak), *words)
+    command(
+        "actions", "add", NAME, "--from", "12+310", "--to", "12+320", "--measure", "=Clean the drain", "--element", "block 1"
+    )
     return [key for (key,) in conn.execute("SELECT id FROM tunnel_api.action ORDER BY id")]
 
 
@@ -56,20 +39,20 @@ def rows(conn: psycopg.Connection) -> list[tuple[Any, ...]]:
 
 def test_actions_are_added_changed_listed_and_removed(two: list[int], conn: psycopg.Connection) -> None:
     first, second = two
-    done("actions", "set", str(second), "--state", "ordered", "--responsible", "Works Ltd")
-    shown = json.loads(done("actions", "list", "demo", "--json").stdout)["actions"]
+    command("actions", "set", str(second), "--state", "ordered", "--responsible", "Works Ltd")
+    shown = json.loads(command("actions", "list", "demo", "--json").stdout)["actions"]
     assert [row["id"] for row in shown] == [first, second], "by due date"
     assert [row["overdue"] for row in shown] == [True, None]
     assert (shown[1]["state"], shown[1]["responsible"], shown[1]["chainage_from"]) == ("ordered", "Works Ltd", 12310)
-    late = done("actions", "list", "demo", "--overdue").output
+    late = command("actions", "list", "demo", "--overdue").output
     assert "2020-03-31, overdue" in late
     assert f"finding {shown[0]['finding_id']}" in late
-    assert "element block 1" in done("actions", "list", "demo", "--state", "ordered").output
+    assert "element block 1" in command("actions", "list", "demo", "--state", "ordered").output
     assert "1200.50 EUR" in late
     assert "Clean" not in late
     assert "not compared" in late
-    assert "Inject" not in done("actions", "list", "demo", "--state", "ordered").output
-    done("actions", "remove", str(first))
+    assert "Inject" not in command("actions", "list", "demo", "--state", "ordered").output
+    command("actions", "remove", str(first))
     assert [row[0] for row in rows(conn)] == [second]
 
 
@@ -77,10 +60,10 @@ def test_a_done_action_whose_leak_is_still_wet_is_named(two: list[int], conn: ps
     """Leak 2 is dry in the later survey, and leak 3 is as it was."""
     add_change(conn, NAME)
     conn.commit()
-    assert "wet in a later survey" not in done("actions", "list", "demo").output
+    assert "wet in a later survey" not in command("actions", "list", "demo").output
     for finding in ("2", "3"):
-        done("actions", "add", NAME, "--finding", finding, "--measure", "inject", "--state", "done")
-    result = done("actions", "list", "demo", "--state", "done")
+        command("actions", "add", NAME, "--finding", finding, "--measure", "inject", "--state", "done")
+    result = command("actions", "list", "demo", "--state", "done")
     assert "dry since 2026-05-04" in result.output
     key = max(row[0] for row in rows(conn))
     assert f"done, but wet in a later survey: 1 action ({key})" in result.stderr
@@ -90,14 +73,14 @@ def test_an_outdated_comparison_is_named(two: list[int], conn: psycopg.Connectio
     """The later survey has no results of detection any more."""
     add_change(conn, NAME)
     conn.commit()
-    assert "outdated" not in done("actions", "list", "demo").output
+    assert "outdated" not in command("actions", "list", "demo").output
     add_change_run(conn, NAME)
     conn.commit()
     message = (
         f"follow-ups in {LATER} are outdated (one of the surveys has nothing there any more): tunneldb compare {NAME} {LATER}"
     )
-    assert message in done("actions", "list", "demo").stderr
-    assert message in done("actions", "export", "demo", "-o", str(tmp_path / "list.csv")).stderr
+    assert message in command("actions", "list", "demo").stderr
+    assert message in command("actions", "export", "demo", "-o", str(tmp_path / "list.csv")).stderr
 
 
 @pytest.mark.parametrize(
@@ -156,12 +139,12 @@ def test_a_list_goes_through_a_spreadsheet_and_back(
 ) -> None:
     path = tmp_path / f"actions.{ending}"
     before = rows(conn)
-    done("actions", "export", "demo", "-o", str(path))
-    assert "0 added, 0 changed, 2 unchanged" in done("actions", "import", "demo", str(path)).output
+    command("actions", "export", "demo", "-o", str(path))
+    assert "0 added, 0 changed, 2 unchanged" in command("actions", "import", "demo", str(path)).output
     assert rows(conn) == before
     new = {"survey": NAME, "measure": "Repair", "chainage_from": 12330, "chainage_to": 12331.5, "cost": 10, "currency": "CHF"}
     edit(path, {(2, "state"): "done", (2, "remark"): "injected", (3, "due"): "2027-03-31"}, [new])
-    assert "1 added, 2 changed, 0 unchanged" in done("actions", "import", "demo", str(path)).output
+    assert "1 added, 2 changed, 0 unchanged" in command("actions", "import", "demo", str(path)).output
     first, second, third = rows(conn)
     assert (first[7], first[8], first[1:7]) == ("done", "injected", before[0][1:7])
     assert (second[4], second[1]) == ("2027-03-31", "=Clean the drain")
@@ -188,7 +171,7 @@ def test_wrong_cells_are_refused_whole(
 ) -> None:
     """The line is named, and the change in the line before it is not written, either."""
     path, before = tmp_path / "actions.xlsx", rows(conn)
-    done("actions", "export", "demo", "-o", str(path))
+    command("actions", "export", "demo", "-o", str(path))
     edit_xlsx(path, {(2, "remark"): "x"} | cells, [])
     assert message in refused("actions", "import", "demo", str(path))
     assert rows(conn) == before
@@ -196,8 +179,8 @@ def test_wrong_cells_are_refused_whole(
 
 def test_what_somebody_changed_since_is_not_overwritten(two: list[int], conn: psycopg.Connection, tmp_path: Path) -> None:
     path = tmp_path / "actions.xlsx"
-    done("actions", "export", "demo", "-o", str(path))
-    done("actions", "set", str(two[1]), "--state", "ordered")
+    command("actions", "export", "demo", "-o", str(path))
+    command("actions", "set", str(two[1]), "--state", "ordered")
     assert "0 changed, 2 unchanged" not in refused("actions", "import", "demo", str(path)), (
         "open in the file is the older state"
     )
@@ -206,9 +189,9 @@ def test_what_somebody_changed_since_is_not_overwritten(two: list[int], conn: ps
     assert f"line 3: state: action {two[1]} was changed by" in message
     assert "export the list again" in message
     assert rows(conn)[1][7] == "ordered"
-    done("actions", "export", "demo", "-o", str(path))
+    command("actions", "export", "demo", "-o", str(path))
     edit_xlsx(path, {(3, "state"): "done"}, [])
-    done("actions", "import", "demo", str(path))
+    command("actions", "import", "demo", str(path))
     assert rows(conn)[1][7] == "done"
 
 

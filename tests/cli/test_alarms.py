@@ -8,27 +8,8 @@ from pathlib import Path
 
 import psycopg
 import pytest
-from click.testing import CliRunner, Result
+from support.command import command, refused
 from support.example_survey import NAME
-
-from tunneldb.cli.main import main
-
-
-def run(*words: str) -> Result:
-    return CliRunner().invoke(main, list(words))
-
-
-def done(*words: str, code: int = 0) -> Result:
-    result = run(*words)
-    assert result.exit_code == code, result.output
-    return result
-
-
-def refused(*words: str) -> str:
-    result = run(*words)
-    assert result.exit_code == 2, result.output
-    assert "Traceback" not in result.output
-    return result.output.strip()
 
 
 @pytest.fixture
@@ -52,30 +33,30 @@ OVAL = ("alarms", "add", "demo", "own", "--quantity", "ovality", "--min-inspecte
 )
 def test_the_exit_code_is_the_worst_level(bare: None, limits: tuple[str, str], code: int, said: str) -> None:
     """Rings have an ovality of 0.0001 to 0.01."""
-    done(*OVAL, "--warning", limits[0], "--alarm", limits[1])
-    assert said in done("alarms", "check", "demo", code=code).stderr
+    command(*OVAL, "--warning", limits[0], "--alarm", limits[1])
+    assert said in command("alarms", "check", "demo", code=code).stderr
 
 
 def test_what_could_not_be_judged_has_its_own_code(bare: None, conn: psycopg.Connection) -> None:
     """5 without a warning; a warning is said before what is unknown; the others of an alarm likewise."""
-    done(*OVAL, "--warning", "0.02", "--alarm", "0.03")
+    command(*OVAL, "--warning", "0.02", "--alarm", "0.03")
     conn.execute("DELETE FROM tunnel.ring WHERE number BETWEEN 11 AND 20")
     conn.commit()
-    result = done("alarms", "check", "demo", code=5)
+    result = command("alarms", "check", "demo", code=5)
     (line,) = [line for line in result.stdout.splitlines() if line.startswith("unknown")]
     assert line.split()[:4] == ["unknown", "own", "12320.000", "12340.000"]
     assert line.endswith("no ring measured")
-    done("alarms", "add", "demo", "wet", "--quantity", "wet_area", "--warning", "5", "--alarm", "1000")
-    lines = done("alarms", "check", "demo", code=3).stdout.splitlines()[1:]
+    command("alarms", "add", "demo", "wet", "--quantity", "wet_area", "--warning", "5", "--alarm", "1000")
+    lines = command("alarms", "check", "demo", code=3).stdout.splitlines()[1:]
     assert [line.split()[0] for line in lines] == ["warning", "unknown"]
-    done("alarms", "add", "demo", "wetter", "--quantity", "wet_area", "--warning", "1", "--alarm", "5")
-    lines = done("alarms", "check", "demo", code=4).stdout.splitlines()[1:]
+    command("alarms", "add", "demo", "wetter", "--quantity", "wet_area", "--warning", "1", "--alarm", "5")
+    lines = command("alarms", "check", "demo", code=4).stdout.splitlines()[1:]
     assert [line.split()[0] for line in lines] == ["alarm", "warning", "warning", "unknown"]
 
 
 def test_consecutive_unknown_places_are_one_line(bare: None, conn: psycopg.Connection) -> None:
-    done("alarms", "add", "demo", "growth", "--quantity", "growth", "--step", "10", "--warning", "1", "--alarm", "2")
-    lines = done("alarms", "check", "demo", code=5).stdout.splitlines()
+    command("alarms", "add", "demo", "growth", "--quantity", "growth", "--step", "10", "--warning", "1", "--alarm", "2")
+    lines = command("alarms", "check", "demo", code=5).stdout.splitlines()
     assert len(lines) == 2
     assert lines[1].split()[:3] == ["unknown", "growth", "12300.000"]
     assert lines[1].endswith("20 places: no earlier inspection")
@@ -88,24 +69,24 @@ def test_a_tunnel_without_limits_is_no_all_clear(bare: None) -> None:
 
 def test_files_and_json_are_what_sql_says(dsn: str, example: str, conn: psycopg.Connection, tmp_path: Path) -> None:
     path = tmp_path / "alarms.csv"
-    assert f"written to {path}" in done("alarms", "check", "demo", "-o", str(path), code=4).stderr
+    assert f"written to {path}" in command("alarms", "check", "demo", "-o", str(path), code=4).stderr
     rows = list(csv.DictReader(path.open()))
     known = conn.execute("SELECT name, chainage_from, level, why FROM tunnel_api.alarms('demo')").fetchall()
     assert [(row["name"], float(row["chainage_from"]), row["level"], row["why"] or None) for row in rows] == known
-    shown = json.loads(done("alarms", "check", "demo", "--json", code=4).stdout)
+    shown = json.loads(command("alarms", "check", "demo", "--json", code=4).stdout)
     assert [(one["name"], one["chainage_from"], one["level"], one["why"]) for one in shown["alarms"]] == known
     assert (shown["ok"], shown["survey"], shown["date"]) == (False, NAME, "2024-05-04")
     assert sum(shown["levels"].values()) == len(known)
 
 
 def test_limits_are_listed_and_removed(bare: None, conn: psycopg.Connection) -> None:
-    done(*OVAL, "--warning", "0.006", "--alarm", "0.01")
-    done(
+    command(*OVAL, "--warning", "0.006", "--alarm", "0.01")
+    command(
         "alarms", "add", "demo", "walls", "--quantity", "convergence", "--warning", "0.01", "--alarm", "0.02",
         "--clock", "10", "4", "--reference", NAME,
     )  # fmt: skip
     words = ("--warning", "1", "--alarm", "5", "--from", "12+310", "--to", "12+400")
-    done("alarms", "add", "demo", "wet", "--quantity", "wet_area", *words)
+    command("alarms", "add", "demo", "wet", "--quantity", "wet_area", *words)
     rows = conn.execute(
         "SELECT name, quantity, warning, alarm, chainage_from, chainage_to, step, clock_from, clock_to, reference,"
         " min_inspected FROM tunnel_api.alarm_limit ORDER BY name"
@@ -115,12 +96,12 @@ def test_limits_are_listed_and_removed(bare: None, conn: psycopg.Connection) -> 
         ("walls", "convergence", 0.01, 0.02, None, None, None, 10, 4, NAME, 0.95),
         ("wet", "wet_area", 1, 5, 12310, 12400, 100, None, None, None, 0.95),
     ]
-    listed = done("alarms", "list", "demo").stdout
+    listed = command("alarms", "list", "demo").stdout
     for text in ("rings", f"chord 10 to 4 o'clock since {NAME}", "stretches of 100 m", "12+310.000"):
         assert text in listed
-    done("alarms", "remove", "demo", "own")
+    command("alarms", "remove", "demo", "own")
     assert refused("alarms", "remove", "demo", "own").endswith("no limit named 'own': tunneldb alarms list demo")
-    limits = json.loads(done("alarms", "list", "demo", "--json").stdout)["limits"]
+    limits = json.loads(command("alarms", "list", "demo", "--json").stdout)["limits"]
     assert [limit["name"] for limit in limits] == ["walls", "wet"]
 
 
@@ -150,14 +131,14 @@ def test_wrong_limits_are_refused_with_advice(bare: None, words: list[str], mess
 def test_wrong_names_are_refused_with_advice(dsn: str, example: str, tmp_path: Path) -> None:
     taken = ("alarms", "add", "demo", "oval", "--quantity", "ovality", "--warning", "0.01", "--alarm", "0.02")
     assert refused(*taken).endswith("tunneldb alarms remove demo oval")
-    done("alarms", "remove", "demo", "oval")
-    done(*taken)
+    command("alarms", "remove", "demo", "oval")
+    command(*taken)
     for words in (("check", "nothing"), ("list", "nothing"), ("remove", "nothing", "oval")):
         assert "nothing" in refused("alarms", *words)
     assert "written as .csv" in refused("alarms", "check", "demo", "-o", str(tmp_path / "alarms.txt"))
 
 
 def test_the_help_has_the_exit_codes() -> None:
-    text = " ".join(done("alarms", "check", "--help").output.split())
+    text = " ".join(command("alarms", "check", "--help").output.split())
     for code in ("3 a value reaches a warning", "4 a value reaches an alarm", "5 no value reaches a warning, but something"):
         assert code in text

@@ -10,10 +10,8 @@ from pathlib import Path
 
 import psycopg
 import pytest
-from click.testing import CliRunner, Result
+from support.command import command, refused
 from support.example_survey import NAME
-
-from tunneldb.cli.main import main
 
 DOCS = Path(__file__).parents[2] / "docs"
 EXAMPLE = DOCS / "examples" / "rating-example.toml"
@@ -22,29 +20,14 @@ PAGE_SCHEMES = {tomllib.loads(block)["name"]: block for block in PAGE_BLOCKS if 
 """Schemes of the documentation, by name."""
 
 
-def run(*words: str) -> Result:
-    return CliRunner().invoke(main, list(words))
-
-
-def done(*words: str) -> Result:
-    result = run(*words)
-    assert result.exit_code == 0, result.output
-    return result
-
-
-def refused(*words: str) -> str:
-    result = run(*words)
-    assert result.exit_code == 2, result.output
-    assert "Traceback" not in result.output
-    return result.output.strip()
-
-
 def test_an_owners_scheme_from_end_to_end(dsn: str, example: str, conn: psycopg.Connection, tmp_path: Path) -> None:
     """Blocks of 50 m are added, rated by the scheme of the documentation, and written; each number is that of SQL."""
-    done("rating", "add", str(EXAMPLE))
-    done("elements", "add", "demo", "fifty", "--length", "50")
+    command("rating", "add", str(EXAMPLE))
+    command("elements", "add", "demo", "fifty", "--length", "50")
     path = tmp_path / "rating.csv"
-    result = done("rating", "apply", NAME, "--elements", "fifty", "--scheme", "example", "--version", "2026-1", "-o", str(path))
+    result = command(
+        "rating", "apply", NAME, "--elements", "fifty", "--scheme", "example", "--version", "2026-1", "-o", str(path)
+    )
     rows = list(csv.DictReader(path.open()))
     known = conn.execute(
         "SELECT name, result, complete, finding_id FROM tunnel_api.rating(%s, 'fifty', 'example', '2026-1')", [NAME]
@@ -53,7 +36,7 @@ def test_an_owners_scheme_from_end_to_end(dsn: str, example: str, conn: psycopg.
     assert [row["result"] for row in rows] == [row[1] or "" for row in known]
     assert "at least" in result.output, "the first 10 m were not inspected"
     words = ["--elements", "fifty", "--scheme", "example", "--version", "2026-1", "--json"]
-    shown = json.loads(done("rating", "apply", NAME, *words).stdout)
+    shown = json.loads(command("rating", "apply", NAME, *words).stdout)
     assert [one["result"] for one in shown["ratings"]] == [row[1] for row in known]
 
 
@@ -61,7 +44,7 @@ def rated_by_the_page(name: str, conn: psycopg.Connection, folder: Path) -> dict
     """Rate the blocks by a scheme of the page, with a crack of 0.6 mm and 3 m in block 2 and one of severity 3 in block 3."""
     path = folder / "scheme.toml"
     path.write_text(PAGE_SCHEMES[name])
-    done("rating", "add", str(path))
+    command("rating", "add", str(path))
     for severity, line in ((None, "LINESTRING(12355 0, 12358 0)"), (3, "LINESTRING(12408 0, 12409 0)")):
         conn.execute(
             "INSERT INTO tunnel_api.finding_unrolled (survey, kind, severity, width_mm, geom)"
@@ -70,7 +53,7 @@ def rated_by_the_page(name: str, conn: psycopg.Connection, folder: Path) -> dict
         )
     conn.commit()
     written = folder / "rating.csv"
-    done("rating", "apply", NAME, "--elements", "blocks", "--scheme", name, "-o", str(written))
+    command("rating", "apply", NAME, "--elements", "blocks", "--scheme", name, "-o", str(written))
     return {row["name"]: row for row in csv.DictReader(written.open())}
 
 
@@ -88,7 +71,7 @@ def test_the_matrix_of_the_page(dsn: str, example: str, conn: psycopg.Connection
     rows = rated_by_the_page("matrix", conn, tmp_path)
     assert [row["result"] for row in rows.values()] == ["0", "1", "1", "0"]
     assert rows["block 2"]["why"].startswith("Width and length of cracks: 0.6 and 0.00")
-    shown = done("rating", "show", "matrix").output
+    shown = command("rating", "show", "matrix").output
     assert "width_mm ≥ 0.2, 0.5 × density_length > 0.01, 0.05: 0 0 1 | 0 1 2 | 1 2 3" in " ".join(shown.split())
 
 
@@ -99,40 +82,40 @@ def test_the_points_of_the_page(dsn: str, example: str, conn: psycopg.Connection
     assert rows["block 3"]["why"].startswith("60 points: Wet area 40 (")
     assert rows["block 1"]["remark"] == "80 % inspected; growth unknown: no earlier inspection"
     assert {row["complete"] for row in rows.values()} == {"False"}
-    shown = done("rating", "apply", NAME, "--elements", "blocks", "--scheme", "points").output
+    shown = command("rating", "apply", NAME, "--elements", "blocks", "--scheme", "points").output
     assert "less than 95 % was inspected, now or in the earlier inspection (remark): 4 elements" in shown
 
 
 def test_lists_and_removal(dsn: str, example: str, conn: psycopg.Connection) -> None:
-    done("rating", "add", str(EXAMPLE))
-    assert "2026-1" in done("rating", "list").output
-    assert "≥ 0.2: 1; ≥ 0.5: 2; ≥ 2: 3" in done("rating", "show", "example", "2026-1").output
-    assert "blocks" in done("elements", "list", "demo").output
-    done("rating", "remove", "example", "2026-1")
-    done("elements", "remove", "demo", "blocks")
+    command("rating", "add", str(EXAMPLE))
+    assert "2026-1" in command("rating", "list").output
+    assert "≥ 0.2: 1; ≥ 0.5: 2; ≥ 2: 3" in command("rating", "show", "example", "2026-1").output
+    assert "blocks" in command("elements", "list", "demo").output
+    command("rating", "remove", "example", "2026-1")
+    command("elements", "remove", "demo", "blocks")
     assert refused("rating", "show", "example", "2026-1").endswith("tunneldb rating list")
     assert refused("elements", "remove", "demo", "blocks").endswith("tunneldb elements list demo")
 
 
 def test_a_version_is_never_changed(dsn: str, example: str) -> None:
-    done("rating", "add", str(EXAMPLE))
+    command("rating", "add", str(EXAMPLE))
     message = refused("rating", "add", str(EXAMPLE))
     assert "a version is never changed" in message
     assert "tunneldb rating remove example 2026-1" in message
 
 
 def test_a_scheme_of_the_program_is_added_by_its_name(dsn: str, example: str) -> None:
-    listed = json.loads(done("rating", "list", "--shipped", "--json").stdout)["schemes"]
+    listed = json.loads(command("rating", "list", "--shipped", "--json").stdout)["schemes"]
     (scheme,) = [one for one in listed if one["name"] == "gb-50108-2008"]
     assert "https://" in scheme["source"]
-    assert "gb-50108-2008 1: 4 rules, results 1, 2, 3, 4" in done("rating", "add", "--shipped", "gb-50108-2008").stderr
-    assert scheme["source"] in done("rating", "show", "gb-50108-2008").output
-    assert "≥ 1: 2" in done("rating", "show", "gb-50108-2008").output
+    assert "gb-50108-2008 1: 4 rules, results 1, 2, 3, 4" in command("rating", "add", "--shipped", "gb-50108-2008").stderr
+    assert scheme["source"] in command("rating", "show", "gb-50108-2008").output
+    assert "≥ 1: 2" in command("rating", "show", "gb-50108-2008").output
 
 
 def test_schemes_of_the_program_are_listed_without_a_server(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("TUNNELDB_DSN", "host=nowhere.invalid")
-    assert "sia-272-2024" in done("rating", "list", "--shipped").output
+    assert "sia-272-2024" in command("rating", "list", "--shipped").output
 
 
 @pytest.mark.parametrize(
@@ -149,7 +132,7 @@ def test_a_wrong_choice_of_a_scheme_is_refused(words: list[str], message: str) -
 
 
 def test_rings_and_zones_become_elements(dsn: str, example: str, conn: psycopg.Connection) -> None:
-    done("elements", "add", "demo", "rings", "--rings", NAME, "--zones")
+    command("elements", "add", "demo", "rings", "--rings", NAME, "--zones")
     rows = conn.execute(
         "SELECT name, chainage_from, chainage_to, clock_from, clock_to FROM tunnel_api.element WHERE element_set = 'rings'"
         " ORDER BY number"
@@ -171,7 +154,7 @@ def test_blocks_between_joints_become_elements(dsn: str, example: str, conn: psy
             [NAME, low, arc_from, high, arc_to],
         )
     conn.commit()
-    done("elements", "add", "demo", "between", "--joints", NAME)
+    command("elements", "add", "demo", "between", "--joints", NAME)
     rows = conn.execute(
         "SELECT name, chainage_from, chainage_to FROM tunnel_api.element WHERE element_set = 'between' ORDER BY number"
     ).fetchall()
@@ -188,7 +171,7 @@ def test_elements_of_a_file(dsn: str, example: str, conn: psycopg.Connection, tm
     path.write_text("name,chainage_from,chainage_to,clock_from,clock_to\nportal,12300,12310,0,12\nvault 1,12310,12330,9,3\n")
     refused("elements", "add", "demo", "own", "--file", str(path))  # 0 and 12 are one place
     path.write_text("name,chainage_from,chainage_to,clock_from,clock_to\nportal,12300,12310,6,5.9\nvault 1,12310,12330,9,3\n")
-    done("elements", "add", "demo", "own", "--file", str(path))
+    command("elements", "add", "demo", "own", "--file", str(path))
     rows = conn.execute("SELECT name, clock_from FROM tunnel_api.element WHERE element_set = 'own' ORDER BY number").fetchall()
     assert rows == [("portal", 6), ("vault 1", 9)]
 

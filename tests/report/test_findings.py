@@ -36,6 +36,7 @@ from tunneldb.report.owner import CHAPTERS, Owner, read_owner
 from tunneldb.report.pictures import trouble
 from tunneldb.report.pictures.load import Source
 from tunneldb.report.words import english_texts, languages, plural_forms, read_language
+from tunneldb.store.actions import STATES, URGENCIES
 from tunneldb.store.coverage import GAP_STATES
 from tunneldb.store.dry_regions import read_dry_regions
 from tunneldb.store.survey import get_survey
@@ -534,7 +535,7 @@ def example_catalogue() -> frozenset[str]:
     """Texts of templates and scripts, and those that are put together: states, origins, kinds, …"""
     package = Path(findings.__file__).parent
     texts = set(CHAPTERS.values()) | set(findings.STATE_WORDS.values()) | {"detected", "redrawn", "split", "merged"}
-    texts |= {LEAKS, OTHERS, DARK, *actions.STATES, *actions.URGENCIES, *actions.FOLLOW_UP.values(), "same"}
+    texts |= {LEAKS, OTHERS, DARK, *STATES, *URGENCIES, *actions.FOLLOW_UP.values(), "same"}
     texts |= set(GAP_STATES) | {"Not searched for leaks: {stretches}", "Searched, with gaps: {stretches}"}
     texts |= set(CHANGE_WORDS.values()) | {"Chainage", "Station", "o’clock", "m²", "Client", "Project"}
     texts |= {"Prepared by", "Checked by", "Accepted by", "Name", "Position", "Date", "Signature"}

@@ -10,19 +10,10 @@ from pathlib import Path
 
 import psycopg
 import pytest
-from click.testing import CliRunner, Result
+from support.command import command
 from support.example_survey import NAME
 
-from tunneldb.cli.main import main
-
 TEMPLATE = '[[rating]]\nscheme = "example"\nelements = "blocks"\n'
-
-
-def run(*words: object, code: int = 0) -> Result:
-    result = CliRunner().invoke(main, [str(word) for word in words])
-    assert result.exit_code == code, result.output
-    assert "Traceback" not in result.output
-    return result
 
 
 def body(path: Path) -> str:
@@ -53,7 +44,7 @@ def signed(dsn: str, example: str, conn: psycopg.Connection, tmp_path: Path) -> 
     """A report before edits, and a moment between them."""
     (tmp_path / "owner.toml").write_text(TEMPLATE)
     path = tmp_path / "signed.html"
-    run("report", NAME, "-o", path, "--template", tmp_path / "owner.toml")
+    command("report", NAME, "-o", path, "--template", tmp_path / "owner.toml")
     (moment,) = conn.execute("SELECT clock_timestamp()").fetchone()  # type: ignore[misc]
     conn.rollback()
     time.sleep(0.01)
@@ -67,8 +58,8 @@ def test_a_report_as_of_a_moment_is_the_one_that_was_written_then(
     path, moment = signed
     edit(conn)
     now, then = tmp_path / "now.html", tmp_path / "then.html"
-    run("report", NAME, "-o", now, "--template", tmp_path / "owner.toml")
-    run("report", NAME, "-o", then, "--template", tmp_path / "owner.toml", "--as-of", moment.isoformat())
+    command("report", NAME, "-o", now, "--template", tmp_path / "owner.toml")
+    command("report", NAME, "-o", then, "--template", tmp_path / "owner.toml", "--as-of", moment.isoformat())
     assert body(now) != body(path)
     assert body(then) == body(path)
     assert "The survey as it was on" in then.read_text()
@@ -80,17 +71,17 @@ def test_a_report_as_of_a_moment_is_the_one_that_was_written_then(
 def test_a_report_is_verified(signed: tuple[Path, datetime], conn: psycopg.Connection, tmp_path: Path) -> None:
     """Unchanged; changed since and genuine, with who edited what; the report of the past verifies as well."""
     path, moment = signed
-    assert "unchanged" in run("report", "--verify", path).output
+    assert "unchanged" in command("report", "--verify", path).output
     edit(conn)
-    result = run("report", "--verify", path, code=3)
+    result = command("report", "--verify", path, code=3)
     assert "the report states what the database had then" in result.output
     assert "changed since: 2 edits of finding by root" in result.output
     assert "changed since: 1 edit of action by root" in result.output
-    said = json.loads(run("report", "--verify", path, "--json", code=3).stdout)
+    said = json.loads(command("report", "--verify", path, "--json", code=3).stdout)
     assert (said["genuine"], said["unchanged"]) == (True, False)
     then = tmp_path / "then.html"
-    run("report", NAME, "-o", then, "--as-of", moment.isoformat())
-    run("report", "--verify", then, code=3)
+    command("report", NAME, "-o", then, "--as-of", moment.isoformat())
+    command("report", "--verify", then, code=3)
 
 
 def test_an_altered_database_or_file_is_found(signed: tuple[Path, datetime], conn: psycopg.Connection, tmp_path: Path) -> None:
@@ -100,10 +91,10 @@ def test_an_altered_database_or_file_is_found(signed: tuple[Path, datetime], con
     text = path.read_text()
     (digest,) = re.findall(r'"digest": "(\w+)"', text)
     forged.write_text(text.replace(digest, "0" * 16))
-    assert "not genuine" in run("report", "--verify", forged, code=4).output
+    assert "not genuine" in command("report", "--verify", forged, code=4).output
     conn.execute("UPDATE tunnel.finding SET remark = 'dry' WHERE id = 1")
     conn.commit()
-    assert "not genuine" in run("report", "--verify", path, code=4).output
+    assert "not genuine" in command("report", "--verify", path, code=4).output
 
 
 def test_a_stage_that_ran_since_leaves_it_open(signed: tuple[Path, datetime], conn: psycopg.Connection, tmp_path: Path) -> None:
@@ -115,19 +106,19 @@ def test_a_stage_that_ran_since_leaves_it_open(signed: tuple[Path, datetime], co
         [NAME],
     )
     conn.commit()
-    assert "stage detect of km 12 ran on" in run("report", "--verify", path, code=5).output
-    refused = run("report", NAME, "-o", tmp_path / "then.html", "--as-of", moment.isoformat(), code=2).output
+    assert "stage detect of km 12 ran on" in command("report", "--verify", path, code=5).output
+    refused = command("report", NAME, "-o", tmp_path / "then.html", "--as-of", moment.isoformat(), code=2).output
     assert "take a later moment, or an archive of that time" in refused
     assert not (tmp_path / "then.html").exists()
 
 
 def test_a_pdf_is_verified(dsn: str, example: str, conn: psycopg.Connection, tmp_path: Path) -> None:
     path = tmp_path / "signed.pdf"
-    run("report", NAME, "-o", path, "--from", "12+300", "--to", "12+350")
-    assert "unchanged" in run("report", "--verify", path).output
+    command("report", NAME, "-o", path, "--from", "12+300", "--to", "12+350")
+    assert "unchanged" in command("report", "--verify", path).output
     conn.execute("UPDATE tunnel_api.finding SET review = 'rejected' WHERE id = 1")
     conn.commit()
-    run("report", "--verify", path, code=3)
+    command("report", "--verify", path, code=3)
 
 
 @pytest.mark.parametrize(
@@ -145,7 +136,7 @@ def test_a_pdf_is_verified(dsn: str, example: str, conn: psycopg.Connection, tmp
 )
 def test_wrong_words_are_refused(dsn: str, example: str, tmp_path: Path, words: list[str], message: str) -> None:
     (tmp_path / "text.html").write_text("<p>digest")
-    assert message in run("report", *(word.format(folder=tmp_path) for word in words), code=2).output
+    assert message in command("report", *(word.format(folder=tmp_path) for word in words), code=2).output
 
 
 LISTS = (
@@ -160,16 +151,16 @@ LISTS = (
 @pytest.mark.parametrize("words", LISTS, ids=lambda words: " ".join(words[:2]))
 def test_lists_as_of_a_moment(dsn: str, example: str, conn: psycopg.Connection, words: list[str]) -> None:
     """Each list after edits is the one of before."""
-    before = run(*words).output
+    before = command(*words).output
     (moment,) = conn.execute("SELECT clock_timestamp()").fetchone()  # type: ignore[misc]
     conn.rollback()
     edit(conn)
-    assert run(*words).output != before
-    then = run(*words, "--as-of", moment.isoformat()).output
+    assert command(*words).output != before
+    then = command(*words, "--as-of", moment.isoformat()).output
     assert then == before
-    assert "was added after" in run(*words, "--as-of", "2001-01-01", code=2).output
+    assert "was added after" in command(*words, "--as-of", "2001-01-01", code=2).output
     assert conn.execute("SELECT count(*) FROM tunnel_api.audit WHERE at > %s", [moment]).fetchone() == (4,)
 
 
 def test_actions_of_the_past_need_their_survey(dsn: str, example: str) -> None:
-    assert "--as-of needs --survey" in run("actions", "list", "demo", "--as-of", "2026-01-01", code=2).output
+    assert "--as-of needs --survey" in command("actions", "list", "demo", "--as-of", "2026-01-01", code=2).output

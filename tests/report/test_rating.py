@@ -156,7 +156,7 @@ def test_a_stretch_has_the_elements_that_touch_it(dsn: str, example: str, conn: 
 
 
 def test_findings_link_to_their_place_in_the_report(dsn: str, example: str, tmp_path: Path) -> None:
-    """Where there is one: a leak outside of the stretch, or without the chapter, has a number only."""
+    """A leak outside of the stretch, or in a report without the chapter on leaks, has a number without a link."""
     text = report(tmp_path, BLOCKS)
     assert set(re.findall(r'<a href="#leak-(\d+)">\d+</a></td></tr>', section(text, "rating"))) == {"2", "3", "7"}
     text = report(tmp_path, 'chapters = ["summary", "rating"]\n' + BLOCKS)

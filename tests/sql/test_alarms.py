@@ -234,7 +234,7 @@ def test_archive_copies_are_neither_the_latest_nor_the_earlier(conn: psycopg.Con
 
 
 def test_a_new_survey_without_results_is_unknown(conn: psycopg.Connection, example: str) -> None:
-    """What the survey before has is named, and is no verdict on the new one."""
+    """The value of the survey before is named. It does not decide the level of the new survey."""
     conn.execute(
         "INSERT INTO tunnel.survey (tunnel_id, name, date, intensity_kind, platform)"
         " SELECT id, 'new', '2026-05-04', 'none', 'static' FROM tunnel.tunnel"

@@ -26,3 +26,10 @@ def errors_of(*words: object, code: int = 0) -> str:
         assert result.stderr.count("\n") == 1, result.stderr
         assert "Traceback" not in result.output
     return result.stderr
+
+
+def refused(*words: object) -> str:
+    """Return what a command prints that refuses its words or its input."""
+    output = output_of(*words, code=2)
+    assert "Traceback" not in output
+    return output.strip()

@@ -1,4 +1,4 @@
-"""What questions of owners ask of beyond drawn findings: a later inspection, a second scheme, actions and edits of them."""
+"""Data for the questions of owners: a later inspection, a second rating scheme, actions, and edits of actions."""
 
 from __future__ import annotations
 

@@ -20,9 +20,7 @@ from tunneldb.counted import counted
 from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.files import replacing
-
-URGENCIES = ("immediate", "urgent", "planned", "monitor")
-STATES = ("open", "ordered", "done", "verified")
+from tunneldb.store.actions import STATES, URGENCIES
 
 
 class _Day(click.ParamType[dt.date]):

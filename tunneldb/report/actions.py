@@ -15,9 +15,6 @@ from psycopg.rows import dict_row
 from tunneldb.report.words import Words
 from tunneldb.store.survey import Survey
 
-STATES = ("open", "ordered", "done", "verified")
-URGENCIES = ("immediate", "urgent", "planned", "monitor")
-
 _STATED = (
     "id", "finding_id", "element", "measure", "urgency", "responsible", "due", "cost", "currency", "state", "remark",
 )  # fmt: skip

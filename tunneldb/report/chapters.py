@@ -10,7 +10,6 @@ import numpy as np
 from tunneldb.export.tables.section_dimensions import dimension_rows
 from tunneldb.raster.gap_fill import FILL_NOTE
 from tunneldb.report import data, text
-from tunneldb.report.actions import STATES
 from tunneldb.report.change import CHANGE_WORDS, read_change
 from tunneldb.report.clearance import read_clearance
 from tunneldb.report.deviation import read_deviation
@@ -23,6 +22,7 @@ from tunneldb.report.rings import read_rings
 from tunneldb.report.since import LISTED_WORSE
 from tunneldb.report.strip import LETTERS
 from tunneldb.report.underwater import read_underwater
+from tunneldb.store.actions import STATES
 from tunneldb.store.catalog import crs_text
 from tunneldb.store.remarks import read_remarks
 

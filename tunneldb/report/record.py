@@ -1,4 +1,4 @@
-"""Record in a report's file of what its digest stands for, and its verification against the database."""
+"""Record of a report in its own file, and verification of the report against the database."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _IN_HTML = re.compile(r'<script type="application/json" id="record">(.*?)</scrip
 
 @dataclass(frozen=True)
 class Record:
-    """What a report's digest stands for.
+    """Content that a report's digest was computed from.
 
     Attributes
     ----------

@@ -11,6 +11,9 @@ from psycopg.rows import dict_row
 
 from tunneldb.errors import InputError, UserError
 
+STATES = ("open", "ordered", "done", "verified")
+URGENCIES = ("immediate", "urgent", "planned", "monitor")
+
 EDITABLE = (
     "finding_id", "element", "chainage_from", "chainage_to", "measure", "urgency", "responsible", "due", "cost", "currency",
     "state", "remark",
