@@ -64,18 +64,26 @@ def _ladder(table: CsvTable, name: str, rows: list[int]) -> Ladder:
 def read_start(path: Path) -> dict[str, Near]:
     """Read approximate sonar positions: a row ``file,x,y,within`` for each scan with a known one, by the file's name.
 
+    A column ``azimuth`` may follow: direction of the file's x axis in plan, degrees clockwise from the north of the tunnel's
+    system, known within 60 degrees.
+
     Raises
     ------
     InputError
         Names file, line and value.
     """
-    table = read_csv(path, ("x", "y", "within"))
+    table = read_csv(path, ("x", "y", "within", "azimuth"), default={"azimuth": np.nan})
     out: dict[str, Near] = {}
     for row, name in enumerate(read_texts(path, "file")):
-        within = float(table["within"][row])
+        within, azimuth = float(table["within"][row]), float(table["azimuth"][row])
         if not within > 0.0:
             raise table.error(row, f"within is {within:g}; it is how far the sonar may have stood from x, y, in metres")
+        if not (np.isnan(azimuth) or -360.0 <= azimuth <= 360.0):
+            raise table.error(
+                row, f"azimuth is {azimuth:g}; it is the direction of the file's x axis, degrees from north, clockwise"
+            )
         if name in out:
             raise table.error(row, f"file {name} occurs twice")
-        out[name] = Near(np.array([table["x"][row], table["y"][row]]), within)
+        heading = None if np.isnan(azimuth) else float(np.radians(90.0 - azimuth))
+        out[name] = Near(np.array([table["x"][row], table["y"][row]]), within, heading)
     return out

@@ -35,7 +35,7 @@ class SonarInput:
     Attributes
     ----------
     paths : tuple of Path
-    ladders : Path
+    ladders : Path or None
         See `tunneldb.pipeline.ladder_file.read_ladders`.
     up : int
         1 if the scans' z axis points up, -1 if down.
@@ -48,7 +48,7 @@ class SonarInput:
     """
 
     paths: tuple[Path, ...]
-    ladders: Path
+    ladders: Path | None
     up: int
     water_level: float
     start: Path | None = None
@@ -86,7 +86,7 @@ def register_survey(conn: psycopg.Connection[Any], survey: Survey, given: SonarI
     ------
     UserError
     """
-    ladders = read_ladders(given.ladders)
+    ladders = [] if given.ladders is None else read_ladders(given.ladders)
     places = {} if given.start is None else read_start(given.start)
     unknown = next((name for name in places if name not in {path.name for path in given.paths}), None)
     if unknown is not None:
@@ -111,7 +111,10 @@ def _of_file(scan: SonarPose, factor: float) -> SonarPose:
     """Return the pose of a file's points, from that of these times ``factor``."""
     unit = np.ones(7)
     unit[6] = factor
-    return replace(scan, scale=scan.scale * factor, covariance=scan.covariance * unit * unit[:, None])
+    return replace(
+        scan, scale=scan.scale * factor, covariance=scan.covariance * unit * unit[:, None], walls=scan.walls / factor,
+        alternatives=tuple(replace(one, scale=one.scale * factor) for one in scan.alternatives),
+    )  # fmt: skip
 
 
 def _laser_points(conn: psycopg.Connection[Any], survey: Survey, water_level: float, begin: StartProgress) -> Float:

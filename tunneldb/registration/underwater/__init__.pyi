@@ -1,5 +1,6 @@
 from .block import register as register
 from .results import GIVEN as GIVEN
+from .results import Alternative as Alternative
 from .results import Ladder as Ladder
 from .results import LadderFit as LadderFit
 from .results import Near as Near

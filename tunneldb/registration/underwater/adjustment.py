@@ -23,6 +23,7 @@ from tunneldb.registration.underwater.observations import (
     Rows,
     ladder_rows,
     overlap_rows,
+    profile_rows,
     wall_rows,
     waterline_rows,
 )
@@ -53,6 +54,7 @@ SURROUNDINGS = 0.6  # m around a ladder, more than the error of a first pose
 FIXED_PRECISION = 1e8  # precision of fixed parameters
 MAX_SINGULAR_SHARE = 1e-12  # share of the largest eigenvalue up to which a direction is undetermined
 UNKNOWN_VARIANCE = 1e4  # variance of such a direction
+KEYS_OF_PLACES = {"wall": 0, "scan": 0, "profile": 1}  # kinds whose groups are places, the same in all scans
 
 
 @dataclass(frozen=True)
@@ -63,8 +65,10 @@ class Scan:
     ----------
     patches, smooth : Patches
         Patches for the comparison with walls, and with other scans.
-    edges : (k, 3) float64 array
-        Upper edges of its walls, at the water level, file's axes.
+    columns : Patches
+        Columns of upright walls, for the comparison with the plan of the walls.
+    level : (k, 3) float64 array
+        Points at the water's level, file's axes: its surface from below, or the upper edges of the walls.
     pose : Pose
     ladders : mapping of int to (n, 3) float64 array
         Points around each ladder that it sees, file's axes.
@@ -72,7 +76,8 @@ class Scan:
 
     patches: Patches
     smooth: Patches
-    edges: Float
+    columns: Patches
+    level: Float
     pose: Pose
     ladders: Mapping[int, Float]
 
@@ -81,7 +86,8 @@ def scan_of(
     points: Float,
     patches: Patches,
     smooth: Patches,
-    edges: Float,
+    columns: Patches,
+    level: Float,
     pose: Pose,
     ladders: Iterable[int],
     found: Sequence[LaserLadder],
@@ -94,7 +100,7 @@ def scan_of(
         own = placed.to_ladder(space)
         half = placed.gap / 2.0 + SURROUNDINGS
         near[k] = points[(np.abs(own[:, 0]) < half) & (np.abs(own[:, 2]) < SURROUNDINGS)]
-    return Scan(patches, smooth, edges, pose, near)
+    return Scan(patches, smooth, columns, level, pose, near)
 
 
 @dataclass(frozen=True)
@@ -217,7 +223,9 @@ def _all_rows(
         for k, points in scan.ladders.items():
             found = ladder_rows(points, poses[i], placed[k], float(common[2]), i, (first + 2, first + COMMON + 6 * k), reach)
             rows += [found] if found is not None else []
-        found = waterline_rows(scan.edges, poses[i], float(common[3]), i, first + 3)
+        found = profile_rows(scan.columns, poses[i], walls, i, reach)
+        rows += [found] if found is not None else []
+        found = waterline_rows(scan.level, poses[i], float(common[3]), i, first + 3)
         rows += [found] if found is not None else []
     for i, j in pairs:
         together = (poses[i], poses[j])
@@ -320,7 +328,7 @@ def _sandwich(rows: Sequence[Rows], normal: Float, precision: Float, spread: Flo
             scores = np.zeros((2, len(normal)))
             scores[0, columns] = np.linalg.solve(np.eye(len(columns)) - leverage, score[mine].sum(axis=0))
             scores[1, columns] = weighted[mine].T @ one.shared[mine]
-            keys.append((0 if one.kind in ("wall", "scan") else place + 1, int(name)))
+            keys.append((KEYS_OF_PLACES.get(one.kind, place + 2), int(name)))
             sums.append(scores)
     order = {key: k for k, key in enumerate(dict.fromkeys(keys))}
     total = np.zeros((len(order), 2, len(normal)))

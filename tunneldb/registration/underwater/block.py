@@ -15,16 +15,25 @@ from tunneldb.arrays import Float
 from tunneldb.errors import UserError
 from tunneldb.registration.underwater.adjustment import LADDER_SHIFT, Adjusted, adjust, scan_of
 from tunneldb.registration.underwater.chain import MAX_OVERLAP_DISTANCE
-from tunneldb.registration.underwater.determined import classify_pose
+from tunneldb.registration.underwater.determined import MIN_OPEN_SHIFT, classify_pose
 from tunneldb.registration.underwater.laser_ladders import LaserLadder, find_laser_ladders
 from tunneldb.registration.underwater.observations import Pose, Rows, cell_keys
-from tunneldb.registration.underwater.results import Ladder, LadderFit, Registration, Residual, SonarCloud, SonarPose
-from tunneldb.registration.underwater.single import PreparedScan, StartedScan, prepare
+from tunneldb.registration.underwater.results import (
+    Alternative,
+    Ladder,
+    LadderFit,
+    Registration,
+    Residual,
+    SonarCloud,
+    SonarPose,
+)
+from tunneldb.registration.underwater.single import Hypothesis, PreparedScan, prepare
 from tunneldb.registration.underwater.starting import find_first_poses
 from tunneldb.registration.underwater.walls import Walls, find_walls, lower_edge
 
 WALL_VOXEL = 0.03  # m
 MIN_MOVEMENT_SIGMA = 2.5  # standard deviations from which a ladder has moved between laser and sonar
+MIN_OPEN_HEIGHT = 0.1  # m between possible poses from which the height is open
 MAX_DRY_WALL = 0.1  # m: if the laser sees walls this far below the given water level, the level is wrong
 
 
@@ -56,7 +65,8 @@ def register(laser: Float, clouds: Sequence[SonarCloud], ladders: Sequence[Ladde
     found = find_laser_ladders(local, walls, ladders)
     scans, faults = _prepare([_local(cloud, origin) for cloud in clouds], walls)
     seen = {one.placed.ladder.name for one in found}
-    started, reasons = find_first_poses(scans, walls, found, several=len(ladders) > 1)
+    first = find_first_poses(scans, walls, found, several=len(ladders) > 1)
+    started = first.started
     notes = []
     if edge > MAX_DRY_WALL:
         notes.append(f"the laser sees walls only from {edge:.2f} m above the water; check --water-level")
@@ -67,7 +77,7 @@ def register(laser: Float, clouds: Sequence[SonarCloud], ladders: Sequence[Ladde
     poses = []
     for i, cloud in enumerate(clouds):
         if adjusted is None or i not in started:
-            poses.append(_unknown(cloud))
+            poses.append(_unknown(cloud, first.alternatives.get(i, ()), origin, _walls_of(scans.get(i))))
             continue
         k = known.index(i)
         pose = adjusted.poses[k]
@@ -78,7 +88,7 @@ def register(laser: Float, clouds: Sequence[SonarCloud], ladders: Sequence[Ladde
         poses.append(
             SonarPose(
                 cloud.path, pose.rotation, pose.translation + origin, pose.scale, adjusted.covariance[k], state,
-                open_directions, residuals,
+                open_directions, residuals, (), _walls_of(scans[i]),
             )
         )  # fmt: skip
     notes += [f"ladder {one.placed.ladder.name}: its gaps also fit {_shifts(one)} m higher" for one in found if one.ties]
@@ -86,9 +96,14 @@ def register(laser: Float, clouds: Sequence[SonarCloud], ladders: Sequence[Ladde
         f"ladder {found[k].placed.ladder.name} is not where the laser saw it; the ladder or the tripod may have moved"
         for k in moved
     ]
-    why = [f"{clouds[i].path.name} has no pose: {reason}" for i, reason in reasons.items()]
+    why = [f"{clouds[i].path.name} has no pose: {reason}" for i, reason in first.reasons.items()]
     fits = [_fit(one, k, origin, clouds, started) for k, one in enumerate(found)]
-    return Registration(tuple(poses), tuple(fits), water_level, (*notes, *faults, *why))
+    plan = walls.profile.place + origin[:2]
+    return Registration(tuple(poses), tuple(fits), water_level, (*notes, *faults, *why), plan)
+
+
+def _walls_of(scan: PreparedScan | None) -> Float:
+    return np.zeros((0, 3)) if scan is None else scan.columns.centre
 
 
 def _local(cloud: SonarCloud, origin: Float) -> SonarCloud:
@@ -113,7 +128,7 @@ def _prepare(clouds: Sequence[SonarCloud], walls: Walls) -> tuple[dict[int, Prep
 
 def _adjust_all(
     prepared: Mapping[int, PreparedScan],
-    started: Mapping[int, StartedScan],
+    started: Mapping[int, Hypothesis],
     known: Sequence[int],
     walls: Walls,
     found: Sequence[LaserLadder],
@@ -123,7 +138,9 @@ def _adjust_all(
     scans = []
     for i in known:
         scan, one = prepared[i], started[i]
-        scans.append(scan_of(scan.cloud.points, scan.patches, scan.smooth, scan.edges, one.pose, one.ladders, found))
+        scans.append(
+            scan_of(scan.cloud.points, scan.patches, scan.smooth, scan.columns, scan.level, one.pose, one.ladders, found)
+        )
     place = np.array([scan.pose.translation for scan in scans])
     pairs = [
         (a, b)
@@ -152,12 +169,31 @@ def _along(walls: Walls, pose: Pose) -> Float:
     return np.array([-normal[1], normal[0]])
 
 
-def _unknown(cloud: SonarCloud) -> SonarPose:
+def _unknown(cloud: SonarCloud, options: Sequence[tuple[Hypothesis, float]], origin: Float, walls: Float) -> SonarPose:
+    """Return the state of a scan without a pose, with its possible poses; directions in which these differ are open."""
     nothing = np.full((7, 7), np.nan)
+    alternatives = tuple(
+        Alternative(one.pose.rotation, one.pose.translation + origin, one.pose.scale, probability)
+        for one, probability in options
+    )
     return SonarPose(
         cloud.path, np.full((3, 3), np.nan), np.full(3, np.nan), np.nan, nothing, "undetermined",
-        ("along the tunnel", "height", "half turn"), (),
+        _open_directions(alternatives), (), alternatives, walls,
     )  # fmt: skip
+
+
+def _open_directions(alternatives: Sequence[Alternative]) -> tuple[str, ...]:
+    """Return the names of the directions in which possible poses differ; of all of them if there are none."""
+    if len(alternatives) < 2:
+        return "along the tunnel", "height", "half turn"
+    place = np.array([one.translation for one in alternatives])
+    ahead = np.array([one.rotation[:2, 0] for one in alternatives])
+    names = {
+        "along the tunnel": np.ptp(place[:, :2], axis=0).max() > MIN_OPEN_SHIFT,
+        "height": np.ptp(place[:, 2]) > MIN_OPEN_HEIGHT,
+        "half turn": (ahead @ ahead[0]).min() < 0.0,
+    }
+    return tuple(name for name, is_open in names.items() if is_open)
 
 
 def _residuals(rows: Sequence[Rows], scan: int, names: Sequence[str]) -> tuple[Residual, ...]:
@@ -165,11 +201,11 @@ def _residuals(rows: Sequence[Rows], scan: int, names: Sequence[str]) -> tuple[R
     for one in rows:
         if scan not in (one.scan, one.other):
             continue
-        name = one.name
+        kind, name = ("wall", "plan") if one.kind == "profile" else (one.kind, one.name)
         if one.other is not None:
             name = names[one.other if one.scan == scan else one.scan]
         absolute = np.abs(one.residual)
-        out.append(Residual(one.kind, name, len(absolute), float(np.median(absolute)), float(np.percentile(absolute, 95))))
+        out.append(Residual(kind, name, len(absolute), float(np.median(absolute)), float(np.percentile(absolute, 95))))
     return tuple(out)
 
 
@@ -177,9 +213,7 @@ def _shifts(one: LaserLadder) -> str:
     return " or ".join(f"{shift:.2f}" for shift in one.ties)
 
 
-def _fit(
-    one: LaserLadder, k: int, origin: Float, clouds: Sequence[SonarCloud], started: Mapping[int, StartedScan]
-) -> LadderFit:
+def _fit(one: LaserLadder, k: int, origin: Float, clouds: Sequence[SonarCloud], started: Mapping[int, Hypothesis]) -> LadderFit:
     placed = one.placed
     scans = tuple(cloud.path.name for i, cloud in enumerate(clouds) if i in started and k in started[i].ladders)
     across, up, out = placed.axes

@@ -14,7 +14,13 @@ from tunneldb.registration.underwater.first_pose import LevelScan
 from tunneldb.registration.underwater.laser_ladders import LaserLadder
 from tunneldb.registration.underwater.observations import MIN_BED_COSINE, Patches, Pose, overlap_rows
 from tunneldb.registration.underwater.relief import NO_EVIDENCE, PIXEL, Relief, height_difference, likelihood, relief_of
-from tunneldb.registration.underwater.single import MIN_EDGES, PreparedScan, StartedScan, missing_ladder_count, visible_ladders
+from tunneldb.registration.underwater.single import (
+    MIN_LEVEL_POINTS,
+    Hypothesis,
+    PreparedScan,
+    missing_ladder_count,
+    visible_ladders,
+)
 from tunneldb.registration.underwater.walls import Walls
 
 MAX_OVERLAP_DISTANCE = 15.0  # m between scanners whose scans are compared
@@ -95,10 +101,10 @@ class _Place:
 def pose_from_neighbours(
     i: int,
     reliefs: Reliefs,
-    started: Mapping[int, StartedScan],
+    started: Mapping[int, Hypothesis],
     walls: Walls,
     found: Sequence[LaserLadder],
-) -> tuple[StartedScan, float] | None:
+) -> tuple[Hypothesis, float] | None:
     """Return the pose of scan ``i`` relative to started scans of the same bed, and its likelihood; None if uncertain."""
     tried = (_fitted_pose(i, place, reliefs, started, walls) for place in _likeliest(_places(i, reliefs, started)))
     settled = sorted((one for one in tried if one is not None), key=lambda one: -one[1])
@@ -109,7 +115,7 @@ def pose_from_neighbours(
         if less > likelihood - MIN_LEAD and np.linalg.norm(other.translation - pose.translation) > PLACE_TOLERANCE:
             return None
     seen = visible_ladders(reliefs.scans[i], pose, found)
-    return None if missing_ladder_count(pose, seen, found) else (StartedScan(pose, seen), likelihood)
+    return None if missing_ladder_count(pose, seen, found) else (Hypothesis(pose, seen), likelihood)
 
 
 def _likeliest(places: Sequence[_Place]) -> list[_Place]:
@@ -124,7 +130,7 @@ def _likeliest(places: Sequence[_Place]) -> list[_Place]:
 
 
 def _fitted_pose(
-    i: int, place: _Place, reliefs: Reliefs, started: Mapping[int, StartedScan], walls: Walls
+    i: int, place: _Place, reliefs: Reliefs, started: Mapping[int, Hypothesis], walls: Walls
 ) -> tuple[Pose, float] | None:
     """Return the pose fitted from a place to neighbouring scans, and its likelihood by the bed; None if it slides away."""
     scans = reliefs.scans
@@ -162,15 +168,15 @@ def _fitted_to_neighbours(own: Scan, others: Sequence[Scan], walls: Walls, direc
 
 
 def _shows_waterline(scan: PreparedScan | Scan) -> bool:
-    """Return True if it shows the upper edges of its walls, at the water: it is level, while errors of slope accumulate."""
-    return len(scan.edges) >= MIN_EDGES
+    """Return True if it shows the water's level: that is level, while errors of slope accumulate."""
+    return len(scan.level) >= MIN_LEVEL_POINTS
 
 
 def _levelled(scan: PreparedScan, pose: Pose) -> Scan:
     """Return the scan without ladders, at the height given by the water."""
     if _shows_waterline(scan):
         pose = replace(pose, translation=np.array([*pose.translation[:2], -scan.flat.top]))
-    return Scan(scan.patches, scan.smooth, scan.edges, pose, {})
+    return Scan(scan.patches, scan.smooth, scan.columns, scan.level, pose, {})
 
 
 def _roughness(patches: Patches, pose: Pose, direction: Float) -> float:
@@ -202,16 +208,16 @@ def bed_likelihood(patches: tuple[Patches, Patches], poses: tuple[Pose, Pose], r
     return float((np.bincount(stretch, log_ratio) / count).sum())
 
 
-def _direction(scan: PreparedScan, pose: Pose) -> Float:
+def direction_of(scan: PreparedScan, pose: Pose) -> Float:
     """Return the direction (2,) of the x axis of a scan's level frame in the tunnel."""
     along = (pose.rotation @ scan.flat.rotation.T)[:2, 0]
     return np.asarray(along / np.linalg.norm(along))
 
 
-def _places(i: int, reliefs: Reliefs, started: Mapping[int, StartedScan]) -> list[_Place]:
+def _places(i: int, reliefs: Reliefs, started: Mapping[int, Hypothesis]) -> list[_Place]:
     """Return possible places of scan ``i``, from each of its pairs, with the likelihood by all scans around them."""
     stand = {k: one.pose.translation[:2] for k, one in started.items()}
-    look = {k: _direction(reliefs.scans[k], one.pose) for k, one in started.items()}
+    look = {k: direction_of(reliefs.scans[k], one.pose) for k, one in started.items()}
     out = []
     for k in started:
         for turned in (False, True):
@@ -233,7 +239,7 @@ def _places(i: int, reliefs: Reliefs, started: Mapping[int, StartedScan]) -> lis
     return out
 
 
-def _pose(i: int, place: _Place, reliefs: Reliefs, started: Mapping[int, StartedScan], walls: Walls) -> Pose | None:
+def _pose(i: int, place: _Place, reliefs: Reliefs, started: Mapping[int, Hypothesis], walls: Walls) -> Pose | None:
     """Return the pose of a level scan at a place, at its own distance from the wall and at the bed's height."""
     flat: LevelScan = reliefs.scans[i].flat
     across = np.array([-place.direction[1], place.direction[0]])
@@ -260,8 +266,8 @@ def agreement(one: int, other: int, poses: tuple[Pose, Pose], reliefs: Reliefs, 
     If the relief is not sufficient, the second scan is fitted to the first from its given pose.
     """
     first, second = poses
-    look = _direction(reliefs.scans[one], first)
-    same = float(look @ _direction(reliefs.scans[other], second)) > 0.0
+    look = direction_of(reliefs.scans[one], first)
+    same = float(look @ direction_of(reliefs.scans[other], second)) > 0.0
     along = float((second.translation - first.translation)[:2] @ look)
     evidence = float(reliefs.near(one, other, along, turned=not same).max())
     if abs(evidence) > MIN_AGREEMENT:

@@ -7,42 +7,68 @@ points are correlated (Vuong, 1989, for models that are not nested; cells are it
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from tunneldb.arrays import Float
+from tunneldb.arrays import Bool, Float
 from tunneldb.registration.underwater.ladder_shape import PlacedLadder, nearest_element
 from tunneldb.registration.underwater.observations import BEAM_SIGMA, MAX_RANGE, RANGE_NOISE, RELIEF, Pose, cell_keys
 from tunneldb.registration.underwater.walls import Walls
 
 HALF_EXPLAINED_SIGMA = 3.0  # standard deviations at which a point is explained by half
-CELL = 0.25  # m
+UNEXPLAINED = 1e4  # squared standard deviations of a point that is at no wall
+CELL = 0.25  # m, of a ladder
+COLUMN = 0.5  # m in plan, of a wall: its plan is the same at all heights
 REACH = 0.15  # m around a ladder
 MIN_MARGIN = 3.0  # standard deviations
+PROFILE_REACH, PROFILE_SIGMA = 0.3, 0.02  # m in plan; m, half of the distance of its points
 
 
-def explained(points: Float, pose: Pose, walls: Walls, ladders: Sequence[PlacedLadder]) -> Float:
-    """Return the log likelihood ratio (n,) that walls or ladders explain each point (n, 3), file's axes, or an outlier.
+@dataclass(frozen=True)
+class Evidence:
+    """Evidence of points for a pose.
 
-    NaN if undefined: the point is too far away, or the laser shows no wall there.
+    Attributes
+    ----------
+    ratio : (n,) float64 array
+        Log likelihood ratio that walls or ladders explain a point, or an outlier. NaN if undefined: the point is too far away,
+        or the laser shows no wall there.
+    ladder : (n,) bool array
+        True if a ladder explains the point best.
     """
+
+    ratio: Float
+    ladder: Bool
+
+
+def explained(points: Float, pose: Pose, walls: Walls, ladders: Sequence[PlacedLadder]) -> Evidence:
+    """Return the evidence of points (n, 3), file's axes, for a pose."""
     space = pose.apply(points)
     reach = np.linalg.norm(space - pose.translation, axis=1)
     best = np.full(len(points), np.inf)
     usable = reach < MAX_RANGE
     away, piece = walls.tree.query(space[:, :2], distance_upper_bound=1.0)
     known = np.isfinite(away)
-    best[known] = (walls.distance(space[known], piece[known]) / np.hypot(RANGE_NOISE, RELIEF)) ** 2
+    known[known] = ~walls.rough[piece[known]]
+    sigma = np.sqrt(RANGE_NOISE**2 + RELIEF**2 + walls.profile.sigma(space[:, 2]) ** 2)
+    best[known] = (walls.distance(space[known], piece[known]) / sigma[known]) ** 2
+    profile_away, _ = walls.profile.tree.query(space[:, :2], distance_upper_bound=PROFILE_REACH)
+    there = np.isfinite(profile_away)
+    best[np.isfinite(away) & ~known & ~there] = UNEXPLAINED  # before rock, or behind it
+    best[there] = np.minimum(best[there], (profile_away[there] / np.hypot(sigma[there], PROFILE_SIGMA)) ** 2)
+    by_ladder = np.zeros(len(points), np.bool_)
     for placed in ladders:
         own = placed.to_ladder(space)
         low, high = placed.ladder.height[0] - REACH, placed.ladder.height[-1] + REACH
         near = (np.abs(own[:, 0]) < placed.gap / 2.0 + REACH) & (np.abs(own[:, 2]) < REACH)
         near &= (own[:, 1] > low) & (own[:, 1] < high)
         if near.any():
-            best[near] = np.minimum(best[near], _ladder_deviation(own[near], placed, pose))
-    return np.where(
-        usable & np.isfinite(best), HALF_EXPLAINED_SIGMA**2 / (2.0 * (1.0 + best / HALF_EXPLAINED_SIGMA**2)), np.nan
-    )
+            deviation = _ladder_deviation(own[near], placed, pose)
+            by_ladder[near] |= deviation < best[near]
+            best[near] = np.minimum(best[near], deviation)
+    ratio = HALF_EXPLAINED_SIGMA**2 / (2.0 * (1.0 + best / HALF_EXPLAINED_SIGMA**2))
+    return Evidence(np.where(usable & np.isfinite(best), ratio, np.nan), by_ladder)
 
 
 def _ladder_deviation(own: Float, placed: PlacedLadder, pose: Pose) -> Float:
@@ -59,13 +85,16 @@ def _ladder_deviation(own: Float, placed: PlacedLadder, pose: Pose) -> Float:
     return np.asarray((along / RANGE_NOISE) ** 2 + across / (BEAM_SIGMA * reach) ** 2)
 
 
-def margin(points: Float, one: Float, other: Float) -> float:
+def margin(points: Float, one: Evidence, other: Evidence) -> float:
     """Return by how many standard deviations one pose explains points (n, 3) better than another.
 
-    Only points that both poses explain (n,) are included: walls that are known farther along under one pose are no evidence.
+    Only points that both poses explain are included: walls that are known farther along under one pose are no evidence.
     """
-    both = np.isfinite(one) & np.isfinite(other)
-    _, number = np.unique(cell_keys(points[both], CELL), return_inverse=True)
-    difference = np.bincount(number, (one - other)[both])
+    both = np.isfinite(one.ratio) & np.isfinite(other.ratio)
+    bar = (one.ladder | other.ladder)[both]
+    column = cell_keys(points[both] * [1.0, 1.0, 0.0], COLUMN)
+    key = np.where(bar, -cell_keys(points[both], CELL), column)
+    _, number, count = np.unique(key, return_inverse=True, return_counts=True)
+    difference = np.bincount(number, (one.ratio - other.ratio)[both]) / count
     spread = float(np.sqrt((difference**2).sum()))
     return float(difference.sum()) / spread if spread > 0.0 else 0.0

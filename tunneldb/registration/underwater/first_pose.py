@@ -18,6 +18,7 @@ from tunneldb.arrays import Float
 from tunneldb.errors import UserError
 from tunneldb.registration.underwater.ladder_shape import PlacedLadder
 from tunneldb.registration.underwater.walls import Walls
+from tunneldb.registration.underwater.water_surface import find_surface
 from tunneldb.registration.underwater.waterline import find_waterline
 from tunneldb.robust import MAD_TO_SIGMA
 
@@ -54,8 +55,10 @@ class LevelScan:
         Median height of the bed, m.
     edges : (k, 3) float64 array
         Upper edges of its walls, at the water level; see `find_waterline`.
+    surface : (k, 3) float64 array
+        Points of the water's surface; see `find_surface`.
     top : float
-        Height of the edges, m, or of the highest points if there are none.
+        Height of the water, m: of the surface, of the edges, or of the highest points.
     """
 
     rotation: Float
@@ -64,6 +67,7 @@ class LevelScan:
     points: Float
     bed: float
     edges: Float
+    surface: Float
     top: float
 
 
@@ -77,8 +81,8 @@ class Candidate:
     ladder: str
 
 
-def level(points: Float, up: int, width: float) -> LevelScan:
-    """Level a scan (n, 3), file's axes, between walls ``width`` m apart.
+def level(points: Float, up: int, widths: tuple[float, float]) -> LevelScan:
+    """Level a scan (n, 3), file's axes, between walls whose distance is within ``widths``, m.
 
     Raises
     ------
@@ -88,7 +92,7 @@ def level(points: Float, up: int, width: float) -> LevelScan:
     rotation = np.diag([1.0, float(up), float(up)])  # half a turn about x if z points down
     turned = points @ rotation.T
     near = np.linalg.norm(turned[:, :2], axis=1) < MAX_RANGE
-    angle, low, high = _parallel_walls(turned[near], width)
+    angle, low, high = _parallel_walls(turned[near], widths)
     rotation = _about_z(-angle) @ rotation
     slopes = (0.0, 0.0)
     bed = 0.0
@@ -111,7 +115,9 @@ def level(points: Float, up: int, width: float) -> LevelScan:
         raise UserError("the scan is tilted by more than 15°; check --up")
     edges = find_waterline(turned, (low, high), slopes)
     top = float(np.median(edges[:, 2])) if len(edges) else float(np.percentile(turned[:, 2], TOP_PERCENTILE))
-    return LevelScan(rotation, (low, high), slopes, turned, bed, edges, top)
+    surface = find_surface(turned, (low, high), top)
+    top = float(np.median(surface[:, 2])) if len(surface) else top
+    return LevelScan(rotation, (low, high), slopes, turned, bed, edges, surface, top)
 
 
 def _about_z(angle: float) -> Float:
@@ -119,11 +125,12 @@ def _about_z(angle: float) -> Float:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-def _parallel_walls(points: Float, width: float) -> tuple[float, float, float]:
-    """Return the direction in plan, rad, of two parallel walls ``width`` apart, and their offsets across it, m."""
+def _parallel_walls(points: Float, widths: tuple[float, float]) -> tuple[float, float, float]:
+    """Return the direction in plan, rad, of two parallel walls within ``widths`` apart, and their offsets across it, m."""
     weight = np.minimum(np.linalg.norm(points[:, :2], axis=1) ** 2, 50.0)  # rays fan out
     best = (-1.0, 0.0, 0.0, 0.0)
-    lags = np.arange(int(width * (1.0 - WIDTH_TOLERANCE) / BIN), int(width * (1.0 + WIDTH_TOLERANCE) / BIN) + 1)
+    lags = np.arange(int(widths[0] * (1.0 - WIDTH_TOLERANCE) / BIN), int(widths[1] * (1.0 + WIDTH_TOLERANCE) / BIN) + 1)
+    lags = lags[lags < int(2 * MAX_RANGE / BIN)]
     for angle in ANGLES:
         across = -np.sin(angle) * points[:, 0] + np.cos(angle) * points[:, 1]
         k = np.floor((across + MAX_RANGE) / BIN).astype(np.int64)
@@ -136,7 +143,8 @@ def _parallel_walls(points: Float, width: float) -> tuple[float, float, float]:
                 best = (float(both[i]), float(angle), (i + 0.5) * BIN - MAX_RANGE, (i + lag + 0.5) * BIN - MAX_RANGE)
     score, angle, low, high = best
     if score <= 0.0 or not low < 0.0 < high:
-        raise UserError(f"no two walls {width:.1f} m apart (as in the laser scan) around the scanner; is the file in metres?")
+        apart = f"{widths[0]:.1f}" if widths[1] - widths[0] < 0.5 else f"{widths[0]:.1f} to {widths[1]:.1f}"
+        raise UserError(f"no two walls {apart} m apart (as in the laser scan) around the scanner; is the file in metres?")
     return angle, low, high
 
 

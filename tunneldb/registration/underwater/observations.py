@@ -26,6 +26,11 @@ SHARED = 0.002  # m: common error of a stretch of wall or bed, by relief and sla
 BARS_BEAMS = 4.0  # beams across a bar whose errors are independent: beams that hit it overlap
 WATERLINE_NOISE = 0.025  # m: half a bin, and half of the rest of half a beam
 WATERLINE_SHARED = 0.01  # m
+WATER_MOVEMENT = 0.015  # m of the water between two scans
+MAX_UPRIGHT = 0.4  # greatest vertical component of the normal of an upright wall
+PROFILE_SPACING, PROFILE_NOISE = 0.15, 0.01  # m between a patch and the plan's nearest point, along the wall; m of the plan
+PROFILE_STRETCH, PROFILE_SHARED = 0.5, 0.01  # m of a flank or recess; m, its common error above and below the water
+MIN_PROFILE_COSINE, MIN_PROFILE_PATCHES = 0.8, 4
 MIN_FACING_COSINE = 0.9  # least cosine between the normals of compared patches
 WALL_DEPTH = 3.0  # m below the water
 WALL_TOP = 0.05  # m below the water; closer to it, echoes by way of the surface disturb
@@ -224,6 +229,7 @@ def wall_rows(
     away, piece = walls.tree.query(centre[:, :2], distance_upper_bound=1.0)
     wet = (centre[:, 2] < -WALL_TOP) & (centre[:, 2] > -WALL_DEPTH) & np.isfinite(away)
     piece = np.where(wet, piece, 0)
+    wet &= ~walls.rough[piece]
     normal = walls.normals(piece)
     off = walls.distance(centre, piece)
     facing = ((patches.normal @ pose.rotation.T) * normal).sum(axis=1) > MIN_FACING_COSINE
@@ -251,16 +257,64 @@ def wall_rows(
     return out
 
 
-def waterline_rows(edges: Float, pose: Pose, bias: float, scan: int, column: int) -> Rows | None:
-    """Return heights of the edges (k, 3) of a scan's walls, file's axes, over the water; ``bias`` m is common to all scans."""
-    if len(edges) == 0:
+def profile_rows(patches: Patches, pose: Pose, walls: Walls, scan: int, within: float) -> Rows | None:
+    """Compare a scan's columns with the plan of the walls at the waterline: flanks of piers, ends, recesses, rough walls.
+
+    Columns that face straight pieces of wall are left to `wall_rows`.
+    """
+    profile = walls.profile
+    if len(profile.place) == 0:
         return None
-    place = pose.apply(edges)
-    up = np.tile([0.0, 0.0, 1.0], (len(edges), 1))
+    centre, facing = pose.apply(patches.centre), patches.normal @ pose.rotation.T
+    upright = (np.abs(facing[:, 2]) < MAX_UPRIGHT) & (centre[:, 2] < -WALL_TOP) & (centre[:, 2] > -WALL_DEPTH)
+    away, k = profile.tree.query(centre[:, :2], distance_upper_bound=within + PROFILE_SPACING)
+    near = np.flatnonzero(upright & np.isfinite(away))
+    k, centre, facing = k[near], centre[near], facing[near]
+    normal = profile.normal[k] * np.sign((profile.normal[k] * facing[:, :2]).sum(axis=1))[:, None]
+    off = ((centre[:, :2] - profile.place[k]) * normal).sum(axis=1)
+    beside = np.sqrt(np.maximum(away[near] ** 2 - off**2, 0.0))
+    _, piece = walls.tree.query(centre[:, :2], distance_upper_bound=1.0)
+    straight = piece < len(walls.foot)
+    wall_normal = walls.normal[np.where(straight, piece, 0)]
+    straight &= ~walls.rough[np.where(straight, piece, 0)]
+    straight &= np.abs((wall_normal * normal).sum(axis=1)) > MIN_FACING_COSINE
+    straight &= np.abs(walls.distance(centre, np.where(straight, piece, 0))) < 2.0 * PROFILE_SPACING
+    keep = ~straight & ((normal * facing[:, :2]).sum(axis=1) > MIN_PROFILE_COSINE)
+    keep &= (np.abs(off) < within) & (beside < PROFILE_SPACING)
+    if keep.sum() < MIN_PROFILE_PATCHES:
+        return None
+    near, centre, off, normal = near[keep], centre[keep], off[keep], normal[keep]
+    sigma = np.sqrt(
+        patches.spread[near] ** 2 / patches.count[near] + RELIEF**2 + PROFILE_NOISE**2 + profile.sigma(centre[:, 2]) ** 2
+    )
+    upright_normal = np.column_stack([normal, np.zeros(len(normal))])
     return Rows(
-        place[:, 2] - bias, np.full(len(edges), WATERLINE_NOISE), pose_derivatives(place, pose, up), scan, None, None,
-        np.full((len(edges), 1), -1.0), np.array([column]), np.arange(len(edges)),
-        np.full(len(edges), WATERLINE_SHARED / np.sqrt(len(edges))), "waterline", "",
+        off, sigma, pose_derivatives(centre, pose, upright_normal), scan, None, None,
+        np.zeros((len(off), 0)), np.zeros(0, np.int64), cell_keys(centre * [1.0, 1.0, 0.0], PROFILE_STRETCH),
+        np.full(len(off), PROFILE_SHARED), "profile", "",
+    )  # fmt: skip
+
+
+def waterline_rows(level: Float, pose: Pose, bias: float, scan: int, column: int) -> Rows | None:
+    """Return heights of points (k, 3) of a scan at the water's level, file's axes, over the water.
+
+    ``bias`` m is common to all scans. The water may have moved between scans: the last row, of the mean height, has that
+    uncertainty; the others state only that the water is level.
+    """
+    if len(level) == 0:
+        return None
+    place = pose.apply(level)
+    up = np.tile([0.0, 0.0, 1.0], (len(level), 1))
+    design = pose_derivatives(place, pose, up)
+    mean, height = design.mean(axis=0), place[:, 2] - bias
+    noise = WATERLINE_NOISE / np.sqrt(len(level))
+    common = np.zeros((len(level) + 1, 1))
+    common[-1] = -1.0
+    return Rows(
+        np.append(height - height.mean(), height.mean()),
+        np.append(np.full(len(level), WATERLINE_NOISE), np.hypot(noise, WATER_MOVEMENT)),
+        np.vstack([design - mean, mean]), scan, None, None, common, np.array([column]), np.arange(len(level) + 1),
+        np.append(np.full(len(level), WATERLINE_SHARED / np.sqrt(len(level))), WATER_MOVEMENT), "waterline", "",
     )  # fmt: skip
 
 

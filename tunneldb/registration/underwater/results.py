@@ -6,7 +6,7 @@ m. A point of a file is in the tunnel's frame at ``rotation @ (scale * point) + 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -43,12 +43,19 @@ class Ladder:
     diameter: float
 
 
+MAX_HEADING_ERROR = np.radians(60.0)  # of an approximate heading
+
+
 @dataclass(frozen=True)
 class Near:
-    """Approximate place of a sonar: (2,) in the tunnel's plan, and its greatest error, m."""
+    """Approximate place of a sonar: (2,) in the tunnel's plan, and its greatest error, m; heading of its x axis, rad, if known.
+
+    The heading is counted anticlockwise from the tunnel's x axis.
+    """
 
     place: Float
     within: float
+    heading: float | None = None
 
     def holds(self, place: Float) -> bool:
         """Return True if a place (2,) or (3,) is within the error."""
@@ -67,6 +74,13 @@ class SonarCloud:
     def may_stand(self, place: Float) -> bool:
         """Return True if the sonar may have been at a place (2,) or (3,)."""
         return self.near is None or self.near.holds(place)
+
+    def may_face(self, rotation: Float) -> bool:
+        """Return True if the sonar may have had a rotation (3, 3) from its file's axes to the tunnel's."""
+        if self.near is None or self.near.heading is None:
+            return True
+        own = float(np.arctan2(rotation[1, 0], rotation[0, 0]))
+        return bool(np.cos(own - self.near.heading) > np.cos(MAX_HEADING_ERROR))
 
 
 @dataclass(frozen=True)
@@ -93,6 +107,16 @@ class Residual:
 
 
 @dataclass(frozen=True)
+class Alternative:
+    """Possible pose of a scan that is not determined: as in `SonarPose`, with its probability among the listed ones."""
+
+    rotation: Float
+    translation: Float
+    scale: float
+    probability: float
+
+
+@dataclass(frozen=True)
 class SonarPose:
     """Pose of a sonar scan.
 
@@ -108,6 +132,10 @@ class SonarPose:
     undetermined : tuple of str
         Names of undetermined and weak directions, as ``along the tunnel``, ``height``, ``yaw``; ``ladders disagree``.
     residuals : tuple of Residual
+    alternatives : tuple of Alternative
+        Possible poses of a scan without a pose, the most likely first.
+    walls : (k, 3) float64 array
+        Places of upright walls that it shows, file's axes.
     """
 
     path: Path
@@ -118,6 +146,8 @@ class SonarPose:
     state: str
     undetermined: tuple[str, ...]
     residuals: tuple[Residual, ...]
+    alternatives: tuple[Alternative, ...] = ()
+    walls: Float = field(default_factory=lambda: np.zeros((0, 3)))
 
 
 @dataclass(frozen=True)
@@ -151,9 +181,21 @@ class LadderFit:
 
 @dataclass(frozen=True)
 class Registration:
-    """Result for all scans; ``water_level`` is the height of the water, m."""
+    """Result for all scans.
+
+    Attributes
+    ----------
+    scans : tuple of SonarPose
+    ladders : tuple of LadderFit
+    water_level : float
+        Height of the water, m.
+    notes : tuple of str
+    plan : (k, 2) float64 array
+        Points of the walls at the waterline, as the laser sees them, m.
+    """
 
     scans: tuple[SonarPose, ...]
     ladders: tuple[LadderFit, ...]
     water_level: float
     notes: tuple[str, ...] = ()
+    plan: Float = field(default_factory=lambda: np.zeros((0, 2)))

@@ -1,4 +1,4 @@
-"""Pose of a single sonar scan, from the ladders that it sees."""
+"""Possible poses of a single sonar scan: from the plan of the walls and from ladders, each with its evidence."""
 
 from __future__ import annotations
 
@@ -6,32 +6,36 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import log_ndtr
 
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
-from tunneldb.registration.underwater.adjustment import fit, scan_of
-from tunneldb.registration.underwater.choice import MIN_MARGIN, explained, margin
+from tunneldb.registration.underwater.adjustment import Scan, fit, scan_of
+from tunneldb.registration.underwater.choice import MIN_MARGIN, Evidence, explained, margin
 from tunneldb.registration.underwater.first_pose import Candidate, LevelScan, candidates, level, likeness
 from tunneldb.registration.underwater.laser_ladders import LaserLadder
 from tunneldb.registration.underwater.observations import Patches, Pose, find_patches, find_smooth_patches
+from tunneldb.registration.underwater.plan_search import PlanPose, find_columns, find_plan_poses, plan_cells
 from tunneldb.registration.underwater.results import SonarCloud
 from tunneldb.registration.underwater.walls import Walls
 
-HEIGHT_TOLERANCE = 0.45  # m between the top of a scan's walls and the water
-MAX_CANDIDATES = 8  # candidates of a scan that are fitted
+HEIGHT_TOLERANCE = 0.45  # m between the water in a scan and the laser's water level
+MAX_LADDER_CANDIDATES, MAX_PLAN_CANDIDATES = 8, 12  # candidates of a scan that are fitted
 FIT_POINTS = 60_000
 LEVEL_POINTS = 120_000  # points of a scan that are levelled and compared with ladders and other scans
 FIRST_REACHES = (0.35, 0.25, 0.2, 0.15, 0.12)
 MIN_LIKENESS = 0.35  # least similarity to a ladder
-MIN_TIE_RATIO = 0.92  # share of the best likelihood from which rungs are ambiguous
 MAX_SCALE_ERROR = 0.03  # greatest relative error of the sonar's speed of sound: 45 m/s
-MIN_OTHER_PLACE_RATIO = 0.6  # share of the best likelihood below which another place is rejected
-WATERLINE_SIGMA = 0.15  # standard deviation of the top of a scan's walls, m
-MIN_EDGES, MAX_WATER_ERROR = 6, 0.2  # least number of wall edges; greatest error of the water level, m (less than a rung)
+MIN_LEVEL_POINTS, MAX_WATER_ERROR = 6, 0.2  # least number of points at the water; its greatest error, m (less than a rung)
+SURFACE_SIGMA, EDGE_SIGMA = 0.05, 0.15  # standard deviations of the water's level, by its surface and by edges of walls, m
 PLACE_TOLERANCE, TURN_TOLERANCE = 0.15, np.radians(3.0)  # differences of two candidates with the same pose
 MIN_AIR_HEIGHT, MAX_AIR_SHARE = 0.2, 0.15  # height above the water, m; greatest share of a scan's points above it
 MAX_LADDER_RANGE = 12.0  # m from the scanner
-SIGHT_RANGE = 7.0  # m: a closer ladder must be visible, or the pose is wrong: its bars are two beams apart
+SIGHT_RANGE = 7.0  # m: a closer ladder must be visible, or the pose is unlikely: its bars are two beams apart
+MISSED_LOG_ODDS = float(np.log(0.05))  # of a pose at which a ladder in sight is not seen
+MAX_LEVEL_POINTS = 40  # of the water's surface that are used
+MIN_PLAN_SCORE = 0.45  # least weighted share of a scan's walls that match the laser's plan
+MAX_SLIDE = 1.0  # m by which a fit may move a candidate
 
 
 @dataclass(frozen=True)
@@ -46,8 +50,10 @@ class PreparedScan:
         Evenly thinned points, file's axes.
     patches, smooth : Patches
         Patches of all of its points.
-    edges : (k, 3) float64 array
-        Upper edges of its walls, at the water level, file's axes.
+    columns : Patches
+        Columns of its upright walls.
+    level : (k, 3) float64 array
+        Points at the water's level, file's axes.
     """
 
     cloud: SonarCloud
@@ -55,36 +61,45 @@ class PreparedScan:
     thin: Float
     patches: Patches
     smooth: Patches
-    edges: Float
+    columns: Patches
+    level: Float
 
 
 @dataclass(frozen=True)
-class StartedScan:
-    """First pose of a scan, and the ladders that it sees, by their index in the list of those found."""
+class Hypothesis:
+    """Possible pose of a scan.
+
+    Attributes
+    ----------
+    pose : Pose
+    ladders : tuple of int
+        Ladders that it sees, by their index in the list of those found.
+    log_odds : float
+        Log of its odds against the most likely pose of the scan.
+    by_plan : bool
+        True if the plan of the walls alone excludes other places and the other heading.
+    """
 
     pose: Pose
     ladders: tuple[int, ...]
+    log_odds: float = 0.0
+    by_plan: bool = False
 
 
 @dataclass(frozen=True)
 class NotStarted:
-    """Reason why a scan has no first pose."""
+    """Reason why a scan has no possible pose."""
 
     reason: str
 
 
 @dataclass(frozen=True)
 class _Fitted:
-    """Fitted candidate: visible ladders, number of ladders in sight that are missing, and their similarity."""
+    """Fitted candidate: visible ladders, and number of ladders in sight that are missing."""
 
     pose: Pose
     ladders: tuple[int, ...]
     missed: int
-    likeness: float
-
-    def likelihood(self, top: float) -> float:
-        """Return the similarity, reduced by the distance of the water from the ``top`` of the walls, m above the sonar."""
-        return self.likeness * float(np.exp(-0.5 * ((self.pose.translation[2] + top) / WATERLINE_SIGMA) ** 2))
 
 
 def prepare(cloud: SonarCloud, walls: Walls) -> PreparedScan:
@@ -93,75 +108,149 @@ def prepare(cloud: SonarCloud, walls: Walls) -> PreparedScan:
     Raises
     ------
     UserError
-        If it shows no two walls at the distance of the laser's.
+        If it shows no walls or no bed.
     """
     every = max(1, len(cloud.points) // FIT_POINTS)
-    flat = level(cloud.points[:: max(1, len(cloud.points) // LEVEL_POINTS)], cloud.up, walls.width)
+    flat = level(cloud.points[:: max(1, len(cloud.points) // LEVEL_POINTS)], cloud.up, walls.widths)
     patches, smooth = find_patches(cloud.points), find_smooth_patches(cloud.points)
-    return PreparedScan(cloud, flat, cloud.points[::every], patches, smooth, flat.edges @ flat.rotation)
+    water = flat.surface if len(flat.surface) else flat.edges
+    water = water[:: max(1, -(-len(water) // MAX_LEVEL_POINTS))]
+    columns = find_columns(flat, cloud.points)
+    return PreparedScan(cloud, flat, cloud.points[::every], patches, smooth, columns, water @ flat.rotation)
 
 
-def start(scan: PreparedScan, walls: Walls, found: Sequence[LaserLadder]) -> StartedScan | NotStarted:
-    """Return the most likely pose of a single scan; none if it sees no ladder, or several poses fit equally well.
+def start(scan: PreparedScan, walls: Walls, found: Sequence[LaserLadder]) -> list[Hypothesis] | NotStarted:
+    """Return the possible poses of a scan, the most likely first; none if nothing that it shows matches the laser's points.
 
     Raises
     ------
     UserError
         If it is upside down.
     """
-    cloud, flat, thin = scan.cloud, scan.flat, scan.thin
-    placed = [one.placed for one in found if _in_reach(cloud, one)]
-    may_be = candidates(flat, walls, placed, HEIGHT_TOLERANCE)
-    tried = [one for one in may_be if cloud.may_stand(one.translation)][:MAX_CANDIDATES]
-    patches = find_patches(thin)
-    fitted = [one for one in (_try(thin, patches, one, walls, found) for one in tried) if one.ladders]
+    fitted = _candidates(scan, walls, found)
     if not fitted:
-        return NotStarted("it shows no ladder of the laser scan")
-    high = float(np.median([(one.pose.apply(thin)[:, 2] > MIN_AIR_HEIGHT).mean() for one in fitted]))
-    if high > MAX_AIR_SHARE:
-        raise UserError(f"{cloud.path}: {100.0 * high:.0f} % of its points would be above the water; check --up")
+        return NotStarted("neither its walls nor a ladder match the laser scan")
+    high = float(np.median([(one.pose.apply(scan.thin)[:, 2] > MIN_AIR_HEIGHT).mean() for one in fitted]))
+    if high > MAX_AIR_SHARE and len(scan.flat.surface) == 0:
+        raise UserError(f"{scan.cloud.path}: {100.0 * high:.0f} % of its points would be above the water; check --up")
     scaled = [one for one in fitted if abs(one.pose.scale - 1.0) < MAX_SCALE_ERROR]
-    best = max(scaled, key=lambda one: one.likelihood(flat.top), default=None)
-    if best is None:
+    if not scaled:
         off = 100.0 * (float(np.median([one.pose.scale for one in fitted])) - 1.0)
         return NotStarted(f"its ranges would be wrong by {-off:+.1f} %; check the speed of sound (--sound-speed)")
-    if len(flat.edges) >= MIN_EDGES and abs(best.pose.translation[2] + flat.top) > MAX_WATER_ERROR:
+    high_enough = [one for one in scaled if _water_error(scan, one.pose) < MAX_WATER_ERROR]
+    if not high_enough:
         return NotStarted("its ladder and its walls disagree about the water level")
-    if best.missed:
-        return NotStarted("at its likely place it should show another ladder")
-    for other in scaled:
-        if other.missed or _same(best.pose, other.pose):
+    return _weighed(scan, _distinct(high_enough), walls, found)
+
+
+def _water_error(scan: PreparedScan, pose: Pose) -> float:
+    """Return the distance of the water in a scan from the laser's water level, m; 0 if the scan does not show it."""
+    if len(scan.level) < MIN_LEVEL_POINTS:
+        return 0.0
+    return abs(float(np.median(pose.apply(scan.level)[:, 2])))
+
+
+def _candidates(scan: PreparedScan, walls: Walls, found: Sequence[LaserLadder]) -> list[_Fitted]:
+    cloud, patches = scan.cloud, find_patches(scan.thin)
+    out = []
+    placed = [one.placed for one in found if _in_reach(cloud, one)]
+    by_ladder = [one for one in candidates(scan.flat, walls, placed, HEIGHT_TOLERANCE) if _may_be(cloud, one)]
+    for candidate in by_ladder[:MAX_LADDER_CANDIDATES]:
+        one = _fit_to_ladder(scan, patches, candidate, walls, found)
+        if one.ladders and np.linalg.norm((one.pose.translation - candidate.translation)[:2]) < MAX_SLIDE:
+            out.append(one)
+    cells = plan_cells(scan.flat, scan.columns)
+    for plan in [one for one in find_plan_poses(cloud, cells, walls.profile) if one.score > MIN_PLAN_SCORE][
+        :MAX_PLAN_CANDIDATES
+    ]:
+        first = _pose_of(plan, scan.flat)
+        if not cloud.may_face(first.rotation):
             continue
-        less = other.likelihood(flat.top) / best.likelihood(flat.top)
-        # a wall fits as well one rung lower; elsewhere, or turned by 180°, it is another wall
-        if _same_place(best.pose, other.pose):
-            if less > MIN_TIE_RATIO:
-                return NotStarted("two of its ladder's rungs fit as well")
-        elif less > MIN_OTHER_PLACE_RATIO:
-            explanations = (_explained(thin, one.pose, walls, found) for one in (best, other))
-            if margin(thin, *explanations) < MIN_MARGIN:
-                return NotStarted("two places, or two orientations, fit equally well; give its place by --start")
-    return StartedScan(best.pose, best.ladders)
+        fitted = _fit_to_plan(scan, patches, first, walls, found)
+        if np.linalg.norm((fitted.pose.translation - first.translation)[:2]) < MAX_SLIDE:
+            out.append(fitted)
+    return out
 
 
-def _try(points: Float, patches: Patches, candidate: Candidate, walls: Walls, found: Sequence[LaserLadder]) -> _Fitted:
-    """Fit a candidate, and compute its similarity to the ladders."""
-    pose = Pose(candidate.rotation, candidate.translation, 1.0)
+def _may_be(cloud: SonarCloud, candidate: Candidate) -> bool:
+    return cloud.may_stand(candidate.translation) and cloud.may_face(candidate.rotation)
+
+
+def _pose_of(plan: PlanPose, flat: LevelScan) -> Pose:
+    """Return the pose of a level scan at a place in plan, at the height given by the water."""
+    turn = np.eye(3)
+    turn[:2, :2] = plan.turn()
+    return Pose(turn @ flat.rotation, np.array([*plan.place, -flat.top]), 1.0)
+
+
+def _fit_to_ladder(
+    scan: PreparedScan, patches: Patches, candidate: Candidate, walls: Walls, found: Sequence[LaserLadder]
+) -> _Fitted:
+    """Fit a candidate from a ladder: its height is the ladder's, and is compared with the water's afterwards."""
     first = tuple(k for k, one in enumerate(found) if one.placed.ladder.name == candidate.ladder)
-    no_edges = np.zeros((0, 3))  # the height comes from the ladder only, and is then compared with the water's
-    pose = fit([scan_of(points, patches, patches, no_edges, pose, first, found)], walls, found, [], FIRST_REACHES).poses[0]
+    no_level = np.zeros((0, 3))
+    pose = Pose(candidate.rotation, candidate.translation, 1.0)
+    pose = _fit(scan_of(scan.thin, patches, patches, scan.columns, no_level, pose, first, found), walls, found, FIRST_REACHES)
     near = _near(pose, found)
-    pose = fit([scan_of(points, patches, patches, no_edges, pose, near, found)], walls, found, [], FIRST_REACHES[-3:]).poses[0]
-    space = pose.apply(points)
-    likenesses = [(likeness(space, pose.translation, found[k].placed), k) for k in near]
-    seen = tuple(k for value, k in likenesses if value > MIN_LIKENESS)
-    alike = sum(value for value, k in likenesses if value > MIN_LIKENESS or k in first)
-    missed = missing_ladder_count(pose, seen, found)
-    return _Fitted(pose, seen, missed, alike)
+    pose = _fit(
+        scan_of(scan.thin, patches, patches, scan.columns, no_level, pose, near, found), walls, found, FIRST_REACHES[-3:]
+    )
+    return _seen(scan, pose, found)
 
 
-def _explained(points: Float, pose: Pose, walls: Walls, found: Sequence[LaserLadder]) -> Float:
-    return explained(points, pose, walls, [found[k].placed for k in _near(pose, found)])
+def _fit_to_plan(scan: PreparedScan, patches: Patches, pose: Pose, walls: Walls, found: Sequence[LaserLadder]) -> _Fitted:
+    """Fit a candidate from the plan, first without ladders, then with those that it sees."""
+    pose = _fit(Scan(patches, scan.smooth, scan.columns, scan.level, pose, {}), walls, found, FIRST_REACHES)
+    seen = _seen(scan, pose, found)
+    if not seen.ladders:
+        return seen
+    with_ladders = scan_of(scan.thin, patches, scan.smooth, scan.columns, scan.level, pose, seen.ladders, found)
+    return _seen(scan, _fit(with_ladders, walls, found, FIRST_REACHES[-3:]), found)
+
+
+def _fit(scan: Scan, walls: Walls, found: Sequence[LaserLadder], reaches: Sequence[float]) -> Pose:
+    return fit([scan], walls, found, [], reaches).poses[0]
+
+
+def _seen(scan: PreparedScan, pose: Pose, found: Sequence[LaserLadder]) -> _Fitted:
+    seen = visible_ladders(scan, pose, found)
+    return _Fitted(pose, seen, missing_ladder_count(pose, seen, found))
+
+
+def _distinct(fitted: Sequence[_Fitted]) -> list[_Fitted]:
+    """Return the candidates without repeats; of the same pose the one that sees more ladders."""
+    out: list[_Fitted] = []
+    for one in sorted(fitted, key=lambda one: one.missed - len(one.ladders)):
+        if not any(is_same(one.pose, other.pose) for other in out):
+            out.append(one)
+    return out
+
+
+def _weighed(scan: PreparedScan, fitted: Sequence[_Fitted], walls: Walls, found: Sequence[LaserLadder]) -> list[Hypothesis]:
+    """Return candidates with their odds against the best one: by all points, the water's level, and ladders in sight."""
+    evidence = [_evidence(scan, one.pose, walls, found) for one in fitted]
+    plan = [explained(scan.thin, one.pose, walls, ()) for one in fitted]
+    other = np.array([_log_prior(scan, one) for one in fitted])
+
+    def log_odds(k: int, best: int) -> float:
+        lead = margin(scan.thin, evidence[best], evidence[k])
+        return float(log_ndtr(-lead) - log_ndtr(lead) + other[k] - other[best])
+
+    table = np.array([[0.0 if k == best else log_odds(k, best) for k in range(len(fitted))] for best in range(len(fitted))])
+    best = int(np.argmin(table.max(axis=1)))
+    away = [k for k in range(len(fitted)) if not _same_plan(fitted[k].pose, fitted[best].pose)]
+    by_plan = all(margin(scan.thin, plan[best], plan[k]) > MIN_MARGIN for k in away)
+    out = [Hypothesis(one.pose, one.ladders, float(table[best, k]), k == best and by_plan) for k, one in enumerate(fitted)]
+    return sorted(out, key=lambda one: -one.log_odds)
+
+
+def _evidence(scan: PreparedScan, pose: Pose, walls: Walls, found: Sequence[LaserLadder]) -> Evidence:
+    return explained(scan.thin, pose, walls, [found[k].placed for k in _near(pose, found)])
+
+
+def _log_prior(scan: PreparedScan, one: _Fitted) -> float:
+    sigma = SURFACE_SIGMA if len(scan.flat.surface) else EDGE_SIGMA
+    return -0.5 * (_water_error(scan, one.pose) / sigma) ** 2 + one.missed * MISSED_LOG_ODDS
 
 
 def missing_ladder_count(pose: Pose, seen: Sequence[int], found: Sequence[LaserLadder]) -> int:
@@ -169,14 +258,15 @@ def missing_ladder_count(pose: Pose, seen: Sequence[int], found: Sequence[LaserL
     return sum(k not in seen and _away(pose, found[k]) < SIGHT_RANGE for k in _near(pose, found))
 
 
-def _same(one: Pose, other: Pose) -> bool:
+def is_same(one: Pose, other: Pose) -> bool:
+    """Return True if two poses differ by less than the tolerance."""
     turn = np.arccos(np.clip((np.trace(one.rotation @ other.rotation.T) - 1.0) / 2.0, -1.0, 1.0))
     return bool(np.linalg.norm(one.translation - other.translation) < PLACE_TOLERANCE and turn < TURN_TOLERANCE)
 
 
-def _same_place(one: Pose, other: Pose) -> bool:
+def _same_plan(one: Pose, other: Pose) -> bool:
     """Return True if two poses are the same except for the height."""
-    return _same(one, Pose(other.rotation, np.array([*other.translation[:2], one.translation[2]]), other.scale))
+    return is_same(one, Pose(other.rotation, np.array([*other.translation[:2], one.translation[2]]), other.scale))
 
 
 def visible_ladders(scan: PreparedScan, pose: Pose, found: Sequence[LaserLadder]) -> tuple[int, ...]:

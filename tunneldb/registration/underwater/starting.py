@@ -1,42 +1,49 @@
-"""First poses of all scans: from visible ladders, then relative to other scans, without those that contradict each other."""
+"""First poses of all scans: from walls, ladders and shared beds, without those that contradict each other."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from tunneldb.errors import UserError
 from tunneldb.registration.underwater.chain import MAX_OVERLAP_DISTANCE, Reliefs, agreement, pose_from_neighbours
+from tunneldb.registration.underwater.joint import probabilities
 from tunneldb.registration.underwater.laser_ladders import LaserLadder
-from tunneldb.registration.underwater.single import PreparedScan, StartedScan, start
+from tunneldb.registration.underwater.single import Hypothesis, PreparedScan, start
 from tunneldb.registration.underwater.walls import Walls
 
 MIN_ROUND_SHARE = 0.5  # share of the best log likelihood of a round; less certain scans wait for the next round
+MIN_PROBABILITY = 0.99  # of a pose that is taken
+MIN_ALTERNATIVE, MAX_ALTERNATIVES = 0.01, 8  # least probability of an alternative; their greatest number
+
+
+@dataclass(frozen=True)
+class FirstPoses:
+    """First poses by scan, and of the others why there is none, and the possible poses with their probabilities."""
+
+    started: Mapping[int, Hypothesis]
+    reasons: Mapping[int, str]
+    alternatives: Mapping[int, Sequence[tuple[Hypothesis, float]]]
 
 
 def find_first_poses(
     scans: Mapping[int, PreparedScan], walls: Walls, found: Sequence[LaserLadder], *, several: bool
-) -> tuple[dict[int, StartedScan], dict[int, str]]:
-    """Find first poses from the ladders that a scan sees, then relative to scans that have one, as far as possible.
+) -> FirstPoses:
+    """Find first poses by what each scan shows of walls and ladders, and by the beds that they share, as far as possible.
 
     Parameters
     ----------
     several : bool
         True if more than one ladder stands in the water, visible to the laser or not.
 
-    Returns
-    -------
-    dict of int to StartedScan
-    dict of int to str
-        Reason why each of the others has none.
-
     Raises
     ------
     UserError
-        If at least half of the scans that see a ladder are upside down.
+        If at least half of the scans that have possible poses are upside down.
     """
-    started: dict[int, StartedScan] = {}
+    options: dict[int, list[Hypothesis]] = {}
     reasons, upside_down = {}, []
     for i, scan in scans.items():
         try:
@@ -45,17 +52,25 @@ def find_first_poses(
             upside_down.append(error)
             reasons[i] = "it seems to be upside down"
             continue
-        if isinstance(one, StartedScan):
-            started[i] = one
+        if isinstance(one, list):
+            options[i] = one
         else:
             reasons[i] = one.reason
     # a single scan may have confused two ladders
-    if upside_down and len(upside_down) >= len(started):
+    if upside_down and len(upside_down) >= len(options):
         raise upside_down[0]
     reliefs = Reliefs(scans)
+    likely = probabilities(options, reliefs)
+    started = {}
+    for i, some in options.items():
+        best = int(np.argmax(likely[i]))
+        if likely[i][best] < MIN_PROBABILITY:
+            reasons[i] = "several poses fit; choose one by --start"
+        else:
+            started[i] = some[best]
     started = _agreeing(reliefs, started, reasons, walls, several=several)
     left = [i for i in scans if i not in started]
-    placed: dict[int, tuple[StartedScan, float]] = {}
+    placed: dict[int, tuple[Hypothesis, float]] = {}
     new = list(started)
     while new and left:
         for i in left:
@@ -68,17 +83,25 @@ def find_first_poses(
         started |= {i: placed.pop(i)[0] for i in new}
         left = [i for i in left if i not in started]
     reasons = {i: reason for i, reason in reasons.items() if i not in started}
-    return _agreeing(reliefs, started, reasons, walls, several=several), reasons
+    started = _agreeing(reliefs, started, reasons, walls, several=several)
+    alternatives = {i: _likely(some, likely[i]) for i, some in options.items() if i not in started}
+    return FirstPoses(started, reasons, alternatives)
+
+
+def _likely(options: Sequence[Hypothesis], probability: np.ndarray) -> list[tuple[Hypothesis, float]]:
+    """Return the possible poses that are worth naming, the most likely first."""
+    order = np.argsort(-probability)[:MAX_ALTERNATIVES]
+    return [(options[k], float(probability[k])) for k in order if probability[k] >= MIN_ALTERNATIVE]
 
 
 def _agreeing(
     reliefs: Reliefs,
-    started: Mapping[int, StartedScan],
+    started: Mapping[int, Hypothesis],
     reasons: dict[int, str],
     walls: Walls,
     *,
     several: bool,
-) -> dict[int, StartedScan]:
+) -> dict[int, Hypothesis]:
     """Return the scans that do not contradict each other where they see the same bed, since ladders look alike.
 
     ``reasons`` gets the reasons for the others. With ``several`` ladders, a scan that sees only one may have confused it with
@@ -105,7 +128,8 @@ def _agreeing(
             del kept[i]
             reasons[i] = "its bed differs from the bed that other scans show there"
     if several:
-        alone = [i for i, one in kept.items() if len(one.ladders) < 2 and reliefs.scans[i].cloud.near is None]
+        unconfirmed = {i: one for i, one in kept.items() if len(one.ladders) < 2 and not one.by_plan}
+        alone = [i for i in unconfirmed if reliefs.scans[i].cloud.near is None]
         for i in [i for i in alone if not votes(i)[0]]:
             del kept[i]
             reasons[i] = "it sees only one ladder, which may be confused with another; give its place by --start"

@@ -5,7 +5,7 @@ Frame: local, m, z up and zero at the water's level.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 
 from tunneldb.arrays import Bool, Float, Int64
 from tunneldb.errors import UserError
+from tunneldb.registration.underwater.profile import Profile, find_profile
 from tunneldb.robust import MAD_TO_SIGMA
 
 SPACING = 0.5  # m between anchors along a wall
@@ -22,7 +23,10 @@ REACH = 0.8  # half length of wall fitted at an anchor, m
 FOOT, HEAD = 0.02, 1.5  # heights, m, between which a wall is fitted
 MIN_HEIGHT = 0.25  # least height of the fitted points, m
 MAX_BATTER = 0.3  # batter, tangent
-MAX_ROUGHNESS = 0.04  # m
+MAX_ROUGHNESS = 0.04  # m, of a wall that continues below the water as a plane
+MAX_ROCK_ROUGHNESS = 0.3  # m, of a wall that is only known by its plan
+WIDTH_QUANTILES = (0.05, 0.95)  # of the widths that occur
+MIN_EDGE_POINTS = 200  # for the lower edge of the walls
 MIN_POINTS = 20
 MIN_WIDTH, MAX_WIDTH = 2.0, 40.0  # canal, m
 TUKEY = 4.685
@@ -47,6 +51,10 @@ class Walls:
         Standard deviations of the foot along the normal, m, and of the batter.
     side : (k,) int64 array
         Index of the wall that a piece belongs to.
+    rough : (k,) bool array
+        True for rock: the wall does not continue below the water as a plane.
+    profile : Profile
+        Plan of the walls at the waterline, with its piers and recesses.
     """
 
     foot: Float
@@ -55,6 +63,8 @@ class Walls:
     sigma: Float
     sigma_batter: Float
     side: Int64
+    rough: Bool
+    profile: Profile
 
     @cached_property
     def tree(self) -> cKDTree:
@@ -64,8 +74,9 @@ class Walls:
     def some(self, keep: Bool) -> Walls:
         """Return the pieces of a mask (k,)."""
         return Walls(
-            self.foot[keep], self.normal[keep], self.batter[keep], self.sigma[keep], self.sigma_batter[keep], self.side[keep]
-        )
+            self.foot[keep], self.normal[keep], self.batter[keep], self.sigma[keep], self.sigma_batter[keep], self.side[keep],
+            self.rough[keep], self.profile,
+        )  # fmt: skip
 
     def distance(self, points: Float, piece: Int64) -> Float:
         """Return the distance (n,), m, of points (n, 3) in front of the pieces (n,), square to the wall."""
@@ -78,9 +89,11 @@ class Walls:
         return np.asarray(out / np.linalg.norm(out, axis=1)[:, None])
 
     @cached_property
-    def width(self) -> float:
-        """Median distance between the two sides at the waterline, m."""
-        return float(np.median(_opposite(self.foot, self.normal)[0]))
+    def widths(self) -> tuple[float, float]:
+        """Least and greatest usual distance between the two sides at the waterline, m."""
+        distance, opposite = _opposite(self.foot, self.normal)
+        low, high = np.quantile(distance[opposite], WIDTH_QUANTILES)
+        return float(low), float(high)
 
 
 def find_walls(points: Float) -> Walls:
@@ -107,20 +120,31 @@ def find_walls(points: Float) -> Walls:
         )
     table = np.array(found)
     foot, normal = table[:, :3], table[:, 3:5]
-    walls = Walls(foot, normal, table[:, 5], table[:, 6], table[:, 7], np.zeros(len(foot), np.int64))
+    walls = Walls(
+        foot,
+        normal,
+        table[:, 5],
+        table[:, 6],
+        table[:, 7],
+        np.zeros(len(foot), np.int64),
+        table[:, 8] > MAX_ROUGHNESS,
+        find_profile(points),
+    )
     return _orient(walls)
 
 
 def lower_edge(points: Float, walls: Walls) -> float:
     """Return the height, m, down to which laser points (n, 3) show the walls, at half their usual density or more.
 
-    Only ``points`` are examined; mirror images of the walls in the water are fewer.
+    Only ``points`` are examined; mirror images of the walls in the water are fewer. 0 if there are too few, as on rock.
     """
     low = points[points[:, 2] < USUAL_HEIGHTS[1]]
     away, piece = walls.tree.query(low[:, :2], distance_upper_bound=2.0 * SPACING)
     known = np.isfinite(away)
     low, piece = low[known], piece[known]
-    height = low[np.abs(walls.distance(low, piece)) < MAX_WALL_DISTANCE, 2]
+    height = low[(np.abs(walls.distance(low, piece)) < MAX_WALL_DISTANCE) & ~walls.rough[piece], 2]
+    if len(height) < MIN_EDGE_POINTS:
+        return 0.0
     bins = np.arange(np.floor(height.min() / EDGE_BIN), USUAL_HEIGHTS[1] / EDGE_BIN + 0.5) * EDGE_BIN
     count, _ = np.histogram(height, bins)
     usual = float(np.median(count[bins[:-1] > USUAL_HEIGHTS[0]]))
@@ -128,7 +152,10 @@ def lower_edge(points: Float, walls: Walls) -> float:
 
 
 def _fit(near: Float, low: Float, tree: cKDTree, low_tree: cKDTree, centre: Float) -> list[float] | None:
-    """Fit a line with batter around a place in plan: foot (3), normal (2), batter, standard deviations; None if no wall."""
+    """Fit a line with batter around a place in plan; return None if there is no wall.
+
+    The result is foot (3), normal (2), batter, their standard deviations (2), and roughness.
+    """
     around = low[low_tree.query_ball_point(centre, REACH)]
     if len(around) < MIN_POINTS:
         return None
@@ -151,7 +178,7 @@ def _fit(near: Float, low: Float, tree: cKDTree, low_tree: cKDTree, centre: Floa
     used = mine[weight > 0.1]
     if len(used) < MIN_POINTS or np.ptp(used[:, 2]) < MIN_HEIGHT or np.ptp(along[weight > 0.1]) < SPACING:
         return None
-    if scale > MAX_ROUGHNESS or abs(answer[2]) > MAX_BATTER:
+    if scale > MAX_ROCK_ROUGHNESS or abs(answer[2]) > MAX_BATTER:
         return None
     # Stones are some decimetres wide: their relief averages out with the number of stones, not of points.
     stones = max(np.ptp(used[:, 2]) * np.ptp(along[weight > 0.1]) / 0.3**2, 1.0)
@@ -162,7 +189,7 @@ def _fit(near: Float, low: Float, tree: cKDTree, low_tree: cKDTree, centre: Floa
     foot = middle + answer[0] * axes[1]
     sign = np.sign(normal @ axes[1])
     sigma, sigma_batter = np.sqrt(covariance[[0, 2], [0, 2]])
-    return [*foot, 0.0, *normal, -answer[2] * sign * line[0], sigma, sigma_batter]
+    return [*foot, 0.0, *normal, -answer[2] * sign * line[0], sigma, sigma_batter, scale]
 
 
 def _opposite(foot: Float, normal: Float) -> tuple[Float, Bool]:
@@ -183,9 +210,7 @@ def _orient(walls: Walls) -> Walls:
     keep = some_ahead | some_behind
     if not keep.any():
         raise UserError("the laser's points show only one of the two walls at the water; both are needed")
-    turned = Walls(
-        walls.foot, walls.normal * turn[:, None], walls.batter * turn, walls.sigma, walls.sigma_batter, walls.side
-    ).some(keep)
+    turned = replace(walls, normal=walls.normal * turn[:, None], batter=walls.batter * turn).some(keep)
     pairs = turned.tree.query_pairs(3.0 * SPACING, output_type="ndarray")
     same = (turned.normal[pairs[:, 0]] * turned.normal[pairs[:, 1]]).sum(axis=1) > 0.5
     links = pairs[same]
@@ -198,5 +223,4 @@ def _orient(walls: Walls) -> Walls:
     keep = sizes[label] >= 3
     if not (keep & left).any() or not (keep & ~left).any():
         raise UserError("the laser's points show only one of the two walls at the water; both are needed")
-    named = Walls(turned.foot, turned.normal, turned.batter, turned.sigma, turned.sigma_batter, left.astype(np.int64))
-    return named.some(keep)
+    return replace(turned, side=left.astype(np.int64)).some(keep)

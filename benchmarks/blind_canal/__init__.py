@@ -1,0 +1,1 @@
+"""Canals by authors who have not read the program, and what registration makes of them."""

@@ -1,0 +1,71 @@
+"""The water's surface in a sonar scan, seen from below: as a flat surface, or as a mirror that repeats the bed above it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tunneldb.arrays import Float
+from tunneldb.robust import MAD_TO_SIGMA
+
+CELL = 0.5  # m in plan
+MIN_POINTS, MIN_CELLS = 4, 12  # of a cell, above and below; of such cells
+MIN_UP = 0.15  # m above the sonar
+SHARE_INSIDE = 0.75  # of the width between the walls
+MAX_SPREAD = 0.04  # m of the surface about its plane
+MAX_EDGE_ERROR = 0.2  # m between the surface and the upper edges of the walls
+ROUNDS = 10
+
+
+def find_surface(points: Float, walls: tuple[float, float], top: float) -> Float:
+    """Return points (k, 3) of the surface in a level scan (n, 3), z up; none if it does not show.
+
+    Parameters
+    ----------
+    walls : (float, float)
+        Positions y of the walls.
+    top : float
+        Height of the upper edges of the walls, m.
+    """
+    middle, half = 0.5 * (walls[0] + walls[1]), 0.5 * SHARE_INSIDE * (walls[1] - walls[0])
+    mine = points[np.abs(points[:, 1] - middle) < half]
+    upper, lower = mine[mine[:, 2] > MIN_UP], mine[mine[:, 2] < 0.0]
+    high, low = _cells(upper), _cells(lower)
+    shown = [_flat(np.array([[x, y, z] for (x, y), z in high.items()]).reshape(-1, 3))]
+    both = [[x, y, 0.5 * (z + low[x, y])] for (x, y), z in high.items() if (x, y) in low]
+    shown.append(_flat(np.array(both).reshape(-1, 3)))
+    fitting = [one for one in shown if len(one) and abs(float(np.median(one[:, 2])) - top) < MAX_EDGE_ERROR]
+    if not fitting:
+        return np.zeros((0, 3))
+    return min(fitting, key=lambda one: abs(float(np.median(one[:, 2])) - top))
+
+
+def _cells(points: Float) -> dict[tuple[float, float], float]:
+    """Return the median height of each cell, by its centre."""
+    if len(points) == 0:
+        return {}
+    cell = np.floor(points[:, :2] / CELL).astype(np.int64)
+    names, number, count = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
+    order = np.lexsort([points[:, 2], number.ravel()])
+    begin = np.concatenate([[0], np.cumsum(count)[:-1]])
+    height = points[order, 2][begin + count // 2]
+    return {
+        (float((x + 0.5) * CELL), float((y + 0.5) * CELL)): float(z)
+        for (x, y), z, n in zip(names, height, count, strict=True)
+        if n >= MIN_POINTS
+    }
+
+
+def _flat(points: Float) -> Float:
+    """Return those of some points (k, 3) that lie on a plane; none if they are few or scattered."""
+    if len(points) < MIN_CELLS:
+        return points[:0]
+    design = np.column_stack([np.ones(len(points)), points[:, :2]])
+    answer, scale = np.array([float(np.median(points[:, 2])), 0.0, 0.0]), np.inf
+    for _ in range(ROUNDS):
+        residual = points[:, 2] - design @ answer
+        scale = max(MAD_TO_SIGMA * float(np.median(np.abs(residual))), 0.005)
+        weight = 1.0 / (1.0 + (residual / (2.0 * scale)) ** 2) ** 2
+        weighted = design * weight[:, None]
+        answer = np.linalg.lstsq(weighted.T @ design, weighted.T @ points[:, 2], rcond=None)[0]
+    on_plane = np.abs(points[:, 2] - design @ answer) < 3.0 * scale
+    return points[on_plane] if scale < MAX_SPREAD and on_plane.sum() >= MIN_CELLS else points[:0]
