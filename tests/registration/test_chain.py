@@ -105,7 +105,7 @@ def test_a_scan_is_fitted_beside_one_that_stays() -> None:
     sides = [np.column_stack([steps[:, 0], np.full(len(steps), side), steps[:, 1]]) for side in (-3.0, 3.0)]
     walls = find_walls(np.concatenate(sides) + rng.normal(0.0, 0.002, (2 * len(steps), 3)))
     nothing = np.zeros((0, 3))
-    scans = [Scan(one, one, nothing, first, {}), Scan(other, other, nothing, moved(second, 0.15), {})]
+    scans = [Scan(one, one, one, nothing, first, {}), Scan(other, other, other, nothing, moved(second, 0.15), {})]
     fitted = fit(scans, walls, (), [(0, 1)], (0.3, 0.2, 0.1, 0.1, 0.1, 0.1), fixed=1, hold_height=True)
     np.testing.assert_array_equal(fitted.poses[0].translation, first.translation)
     assert fitted.poses[1].translation[2] == second.translation[2]

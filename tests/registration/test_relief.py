@@ -30,7 +30,7 @@ def seen_from(field: np.ndarray, x: float, up: float, *, turned: bool, seed: int
     walls = (-WIDTH / 2.0 + 0.5, WIDTH / 2.0 + 0.5)
     if turned:
         points, walls = points * np.array([-1.0, -1.0, 1.0]), (-walls[1], -walls[0])
-    return LevelScan(np.eye(3), walls, (0.0, 0.0), points, -up, np.zeros((0, 3)), 0.0)
+    return LevelScan(np.eye(3), walls, (0.0, 0.0), points, -up, np.zeros((0, 3)), np.zeros((0, 3)), 0.0)
 
 
 @pytest.mark.parametrize("turned", [False, True])
@@ -66,5 +66,5 @@ def test_nothing_is_said_where_nothing_is_shared() -> None:
     assert one is not None
     values = likelihood(one, one)
     assert values[0] == values[-1] == NO_EVIDENCE
-    empty = LevelScan(np.eye(3), (-3.0, 3.0), (0.0, 0.0), np.zeros((3, 3)), -1.0, np.zeros((0, 3)), 0.0)
+    empty = LevelScan(np.eye(3), (-3.0, 3.0), (0.0, 0.0), np.zeros((3, 3)), -1.0, np.zeros((0, 3)), np.zeros((0, 3)), 0.0)
     assert relief_of(empty) is None

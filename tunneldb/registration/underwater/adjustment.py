@@ -248,8 +248,15 @@ def _design(rows: Rows) -> tuple[Float, Int64]:
 
 
 def weights_of(rows: Rows) -> Float:
-    """Return the weights (n,) of rows, 1/m², by Geman and McClure."""
-    return np.asarray(1.0 / (1.0 + (_deviation(rows) / QUARTER_WEIGHT_SIGMA) ** 2) ** 2 / rows.sigma**2)
+    """Return the weights (n,) of rows, 1/m², by Geman and McClure.
+
+    The mean height of the water is no outlier: it was compared with the walls. Its weight is constant, since walls hardly
+    separate height from scale, and many rows with a small misfit would overrule one row that may be dropped.
+    """
+    weight = 1.0 / (1.0 + (_deviation(rows) / QUARTER_WEIGHT_SIGMA) ** 2) ** 2
+    if rows.kind == "waterline":
+        weight[-1] = 1.0
+    return np.asarray(weight / rows.sigma**2)
 
 
 def _deviation(rows: Rows) -> Float:

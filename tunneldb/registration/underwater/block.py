@@ -96,7 +96,12 @@ def register(laser: Float, clouds: Sequence[SonarCloud], ladders: Sequence[Ladde
         f"ladder {found[k].placed.ladder.name} is not where the laser saw it; the ladder or the tripod may have moved"
         for k in moved
     ]
-    why = [f"{clouds[i].path.name} has no pose: {reason}" for i, reason in first.reasons.items()]
+    why = [
+        f"{scan.path.name} is open {', '.join(scan.undetermined)}: nothing that it shows determines this"
+        for scan in poses
+        if scan.state == "undetermined" and np.isfinite(scan.scale)
+    ]
+    why += [f"{clouds[i].path.name} has no pose: {reason}" for i, reason in first.reasons.items()]
     fits = [_fit(one, k, origin, clouds, started) for k, one in enumerate(found)]
     plan = walls.profile.place + origin[:2]
     return Registration(tuple(poses), tuple(fits), water_level, (*notes, *faults, *why), plan)

@@ -18,6 +18,7 @@ from tunneldb.registration.underwater.observations import Patches, Pose, find_pa
 from tunneldb.registration.underwater.plan_search import PlanPose, find_columns, find_plan_poses, plan_cells
 from tunneldb.registration.underwater.results import SonarCloud
 from tunneldb.registration.underwater.walls import Walls
+from tunneldb.registration.underwater.water_surface import is_upside_down
 
 HEIGHT_TOLERANCE = 0.45  # m between the water in a scan and the laser's water level
 MAX_LADDER_CANDIDATES, MAX_PLAN_CANDIDATES = 8, 12  # candidates of a scan that are fitted
@@ -30,6 +31,7 @@ MIN_LEVEL_POINTS, MAX_WATER_ERROR = 6, 0.2  # least number of points at the wate
 SURFACE_SIGMA, EDGE_SIGMA = 0.05, 0.15  # standard deviations of the water's level, by its surface and by edges of walls, m
 PLACE_TOLERANCE, TURN_TOLERANCE = 0.15, np.radians(3.0)  # differences of two candidates with the same pose
 MIN_AIR_HEIGHT, MAX_AIR_SHARE = 0.2, 0.15  # height above the water, m; greatest share of a scan's points above it
+MAX_MIRROR_SHARE = 0.4  # greatest share if the water's surface mirrors walls and bed
 MAX_LADDER_RANGE = 12.0  # m from the scanner
 SIGHT_RANGE = 7.0  # m: a closer ladder must be visible, or the pose is unlikely: its bars are two beams apart
 MISSED_LOG_ODDS = float(np.log(0.05))  # of a pose at which a ladder in sight is not seen
@@ -127,16 +129,18 @@ def start(scan: PreparedScan, walls: Walls, found: Sequence[LaserLadder]) -> lis
     UserError
         If it is upside down.
     """
+    if is_upside_down(scan.flat.points, scan.flat.walls):
+        raise UserError(f"{scan.cloud.path}: its bed is above it and the water below; check --up")
     fitted = _candidates(scan, walls, found)
     if not fitted:
-        return NotStarted("neither its walls nor a ladder match the laser scan")
+        return NotStarted("it shows no ladder of the laser scan, nor walls and water that match it")
     high = float(np.median([(one.pose.apply(scan.thin)[:, 2] > MIN_AIR_HEIGHT).mean() for one in fitted]))
-    if high > MAX_AIR_SHARE and len(scan.flat.surface) == 0:
+    if high > (MAX_MIRROR_SHARE if len(scan.flat.surface) else MAX_AIR_SHARE):
         raise UserError(f"{scan.cloud.path}: {100.0 * high:.0f} % of its points would be above the water; check --up")
     scaled = [one for one in fitted if abs(one.pose.scale - 1.0) < MAX_SCALE_ERROR]
-    if not scaled:
-        off = 100.0 * (float(np.median([one.pose.scale for one in fitted])) - 1.0)
-        return NotStarted(f"its ranges would be wrong by {-off:+.1f} %; check the speed of sound (--sound-speed)")
+    off = float(np.median([one.pose.scale for one in fitted if one.ladders or not scaled] or [1.0])) - 1.0
+    if abs(off) > MAX_SCALE_ERROR:
+        return NotStarted(f"its ranges would be wrong by {-100.0 * off:+.1f} %; check the speed of sound (--sound-speed)")
     high_enough = [one for one in scaled if _water_error(scan, one.pose) < MAX_WATER_ERROR]
     if not high_enough:
         return NotStarted("its ladder and its walls disagree about the water level")
@@ -167,7 +171,8 @@ def _candidates(scan: PreparedScan, walls: Walls, found: Sequence[LaserLadder]) 
         if not cloud.may_face(first.rotation):
             continue
         fitted = _fit_to_plan(scan, patches, first, walls, found)
-        if np.linalg.norm((fitted.pose.translation - first.translation)[:2]) < MAX_SLIDE:
+        has_height = bool(fitted.ladders) or len(scan.level) >= MIN_LEVEL_POINTS
+        if has_height and np.linalg.norm((fitted.pose.translation - first.translation)[:2]) < MAX_SLIDE:
             out.append(fitted)
     return out
 

@@ -9,11 +9,15 @@ from tunneldb.robust import MAD_TO_SIGMA
 
 CELL = 0.5  # m in plan
 MIN_POINTS, MIN_CELLS = 4, 12  # of a cell, above and below; of such cells
-MIN_UP = 0.15  # m above the sonar
+MIN_UP = 0.15  # m above or below the sonar
 SHARE_INSIDE = 0.75  # of the width between the walls
 MAX_SPREAD = 0.04  # m of the surface about its plane
+MAX_SPREAD_RATIO = 1.2  # of the surface and the bed: in a scan that is upside down the bed is above
 MAX_EDGE_ERROR = 0.2  # m between the surface and the upper edges of the walls
+MAX_WATER_SPREAD, MIN_BED_RATIO = 0.015, 4.0  # m; ratio of a bed's spread to the water's from which they are told apart
 ROUNDS = 10
+
+Place = tuple[float, float]
 
 
 def find_surface(points: Float, walls: tuple[float, float], top: float) -> Float:
@@ -26,20 +30,29 @@ def find_surface(points: Float, walls: tuple[float, float], top: float) -> Float
     top : float
         Height of the upper edges of the walls, m.
     """
+    high, low = _above_and_below(points, walls)
+    both = {place: 0.5 * (z + low[place]) for place, z in high.items() if place in low}
+    surface, mirror, (_, bed_spread) = _flat(high), _flat(both), _flat(low)
+    shown = [points for points, spread in (surface, mirror) if spread < min(MAX_SPREAD, MAX_SPREAD_RATIO * bed_spread)]
+    fitting = [one for one in shown if abs(float(np.median(one[:, 2])) - top) < MAX_EDGE_ERROR]
+    return min(fitting, key=lambda one: abs(float(np.median(one[:, 2])) - top), default=np.zeros((0, 3)))
+
+
+def is_upside_down(points: Float, walls: tuple[float, float]) -> bool:
+    """Return True if what is below the sonar in a level scan (n, 3) is a surface of water, and what is above it is a bed."""
+    above, below = _above_and_below(points, walls)
+    (_, upper), (_, lower) = _flat(above), _flat(below)
+    return bool(np.isfinite(upper) and lower < MAX_WATER_SPREAD and MIN_BED_RATIO * lower < upper)
+
+
+def _above_and_below(points: Float, walls: tuple[float, float]) -> tuple[dict[Place, float], dict[Place, float]]:
+    """Return the heights of cells above and below the sonar, away from the walls."""
     middle, half = 0.5 * (walls[0] + walls[1]), 0.5 * SHARE_INSIDE * (walls[1] - walls[0])
     mine = points[np.abs(points[:, 1] - middle) < half]
-    upper, lower = mine[mine[:, 2] > MIN_UP], mine[mine[:, 2] < 0.0]
-    high, low = _cells(upper), _cells(lower)
-    shown = [_flat(np.array([[x, y, z] for (x, y), z in high.items()]).reshape(-1, 3))]
-    both = [[x, y, 0.5 * (z + low[x, y])] for (x, y), z in high.items() if (x, y) in low]
-    shown.append(_flat(np.array(both).reshape(-1, 3)))
-    fitting = [one for one in shown if len(one) and abs(float(np.median(one[:, 2])) - top) < MAX_EDGE_ERROR]
-    if not fitting:
-        return np.zeros((0, 3))
-    return min(fitting, key=lambda one: abs(float(np.median(one[:, 2])) - top))
+    return _cells(mine[mine[:, 2] > MIN_UP]), _cells(mine[mine[:, 2] < -MIN_UP])
 
 
-def _cells(points: Float) -> dict[tuple[float, float], float]:
+def _cells(points: Float) -> dict[Place, float]:
     """Return the median height of each cell, by its centre."""
     if len(points) == 0:
         return {}
@@ -55,10 +68,11 @@ def _cells(points: Float) -> dict[tuple[float, float], float]:
     }
 
 
-def _flat(points: Float) -> Float:
-    """Return those of some points (k, 3) that lie on a plane; none if they are few or scattered."""
+def _flat(cells: dict[Place, float]) -> tuple[Float, float]:
+    """Return the cells (k, 3) that lie on a plane, and their spread about it, m; infinite if they are few."""
+    points = np.array([[x, y, z] for (x, y), z in cells.items()]).reshape(-1, 3)
     if len(points) < MIN_CELLS:
-        return points[:0]
+        return points[:0], np.inf
     design = np.column_stack([np.ones(len(points)), points[:, :2]])
     answer, scale = np.array([float(np.median(points[:, 2])), 0.0, 0.0]), np.inf
     for _ in range(ROUNDS):
@@ -68,4 +82,4 @@ def _flat(points: Float) -> Float:
         weighted = design * weight[:, None]
         answer = np.linalg.lstsq(weighted.T @ design, weighted.T @ points[:, 2], rcond=None)[0]
     on_plane = np.abs(points[:, 2] - design @ answer) < 3.0 * scale
-    return points[on_plane] if scale < MAX_SPREAD and on_plane.sum() >= MIN_CELLS else points[:0]
+    return (points[on_plane], scale) if on_plane.sum() >= MIN_CELLS else (points[:0], np.inf)
