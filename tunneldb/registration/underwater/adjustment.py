@@ -34,7 +34,8 @@ BATTER_SIGMA = 0.01  # prior standard deviation of the change of batter at the w
 # Share of a bar's radius between its near surface and the origin of its echo: the mean of Lambert's law over a round bar,
 # 1 - (4/3) / (pi/2); and its uncertainty under other laws.
 DEPTH_SHARE, DEPTH_SPREAD = 1.0 - (4.0 / 3.0) / (np.pi / 2.0), 0.2
-WATERLINE_SIGMA = 0.03  # m: common offset of wall edges above or below the water
+WATERLINE_SIGMA = 0.03  # m: common offset of the water in all scans from the level that is given
+WATERLINE_FIRM_SIGMA = 0.0003  # m: nearly fixed where no ladder shows it; its uncertainty enters the covariance only
 # Prior standard deviations of the sonar's zero on masonry, from stones and joints in its beam, m: some of RELIEF. Walls
 # separate it from scale as poorly as ladders do, so it is nearly fixed, and its uncertainty enters the covariance only.
 ZERO_SIGMA, ZERO_PRIOR_SIGMA = 0.0015, 0.0003
@@ -146,8 +147,9 @@ def adjust(scans: Sequence[Scan], walls: Walls, ladders: Sequence[LaserLadder], 
     """Adjust scans to walls and ladders, and to each other for overlapping ``pairs``."""
     fitted = fit(scans, walls, ladders, pairs, REACHES)
     spread = fitted.precision.copy()  # precision of the prior, for the covariance
-    zero = POSE * len(scans) + 4
+    zero, water = POSE * len(scans) + 4, POSE * len(scans) + 3
     spread[zero, zero] *= (ZERO_SIGMA / ZERO_PRIOR_SIGMA) ** 2
+    spread[water, water] *= (WATERLINE_SIGMA * np.sqrt(spread[water, water])) ** 2
     covariance = _sandwich(fitted.rows, fitted.normal, fitted.precision, spread)
     blocks = [slice(POSE * i, POSE * (i + 1)) for i in range(len(scans))]
     for block in blocks:
@@ -184,6 +186,8 @@ def fit(
     usual = np.array([0.0, 0.0, DEPTH_SHARE * radius, 0.0, 0.0, SLANT_USUAL, SLANT_USUAL, 0.0, 0.0])
     common = usual.copy()
     precision = _prior(len(scans), ladders, radius)
+    if not any(scan.ladders for scan in scans):
+        precision[POSE * len(scans) + 3, POSE * len(scans) + 3] = 1.0 / WATERLINE_FIRM_SIGMA**2
     stay = np.append(np.arange(POSE * fixed), [POSE * fixed + 5] if hold_height else []).astype(np.int64)
     normal, rows = np.eye(count), []
     for reach in reaches:
@@ -225,7 +229,7 @@ def _all_rows(
             rows += [found] if found is not None else []
         found = profile_rows(scan.columns, poses[i], walls, i, reach)
         rows += [found] if found is not None else []
-        found = waterline_rows(scan.level, poses[i], float(common[3]), i, first + 3)
+        found = waterline_rows(scan.level, poses[i], float(common[3]), i, first + 3, firm=not scan.ladders)
         rows += [found] if found is not None else []
     for i, j in pairs:
         together = (poses[i], poses[j])
@@ -333,7 +337,8 @@ def _sandwich(rows: Sequence[Rows], normal: Float, precision: Float, spread: Flo
             mine = number == group
             leverage = weighted[mine].T @ design[mine] @ own
             scores = np.zeros((2, len(normal)))
-            scores[0, columns] = np.linalg.solve(np.eye(len(columns)) - leverage, score[mine].sum(axis=0))
+            if one.kind != "waterline" or name < len(one.residual) - 1:  # the error of the water's mean height is stated
+                scores[0, columns] = np.linalg.solve(np.eye(len(columns)) - leverage, score[mine].sum(axis=0))
             scores[1, columns] = weighted[mine].T @ one.shared[mine]
             keys.append((KEYS_OF_PLACES.get(one.kind, place + 2), int(name)))
             sums.append(scores)

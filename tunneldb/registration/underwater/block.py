@@ -59,7 +59,7 @@ def register(laser: Float, clouds: Sequence[SonarCloud], ladders: Sequence[Ladde
     local = laser - origin
     thin = local[np.unique(cell_keys(local, WALL_VOXEL), return_index=True)[1]]
     walls = find_walls(thin)
-    edge = lower_edge(thin, walls)
+    edge = lower_edge(local, walls)  # mirror images in the water are fewer, which thinned points do not show
     if edge < -MAX_DRY_WALL:
         raise UserError(f"the laser sees walls {-edge:.2f} m below the water level and lower; check --water-level")
     found = find_laser_ladders(local, walls, ladders)

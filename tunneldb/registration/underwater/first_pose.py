@@ -296,6 +296,8 @@ def likeness(points: Float, scanner: Float, placed: PlacedLadder) -> float:
     dots = (begin[:, None] + share[None, :, None] * (end - begin)[:, None]).reshape(-1, 3)
     step = np.repeat(np.linalg.norm(end - begin, axis=1) / len(share), len(share))
     wet = placed.to_space(dots)[:, 2] < -0.03
+    if not wet.any():
+        return -1.0
     low, high = dots[wet, :2].min(axis=0) - 0.2, dots[wet, :2].max(axis=0) + np.array([0.2, 0.0])
     mine = (np.abs(own[:, 2]) < 0.07) & (own[:, :2] > low).all(axis=1) & (own[:, :2] < high).all(axis=1)
     if mine.sum() < 50:

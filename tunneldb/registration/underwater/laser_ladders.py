@@ -35,6 +35,9 @@ LEANING = np.radians(np.arange(-15.0, 15.1, 0.5))  # sideways
 BIN = 0.005  # m
 NOISE = 0.004  # expected noise of laser points on a cylinder, m
 STARTS = 8
+DOTS = 40  # along each bar
+UNSEEN_MARGIN, UNSEEN_REACH = 0.1, 0.06  # m from the limits of height; m around a dot
+UNSEEN_LENGTH = 0.05  # m of a bar that is not seen, for a log likelihood of 1
 MAX_TIE_LOG_RATIO = float(np.log(100.0))  # likelihood ratio up to which two solutions are ambiguous
 POINTS_PER_OBSERVATION = 5.0  # one point in this many has an independent error
 MAX_COST_SHARE = 0.5  # share of the cost of outliers from which a first fit is not a ladder
@@ -156,7 +159,10 @@ def _fit_cluster(cluster: Float, out: Float, ladder: Ladder) -> LaserLadder | No
     if min((cost for cost, _ in tried), default=np.inf) > MAX_COST_SHARE * _astray(len(few)):
         return None
     tried.sort(key=lambda one: one[0])
-    refined = sorted((_refine(cluster, start, 40) for _, start in tried), key=lambda one: one[0])
+    refined = [_refine(cluster, start, 40) for _, start in tried]
+    refined = sorted(
+        ((cost + _unseen_cost(cluster, one), one, spread) for cost, one, spread in refined), key=lambda one: one[0]
+    )
     cost, placed, covariance = refined[0]
     own = placed.to_ladder(cluster)
     which, away = nearest_element(own, placed)
@@ -180,6 +186,22 @@ def _fit_cluster(cluster: Float, out: Float, ladder: Ladder) -> LaserLadder | No
         if other_cost < cost + tie and np.linalg.norm(other.origin - placed.origin) > 0.1
     )
     return LaserLadder(placed, rms, tuple(ladder.number[i] for i in seen), int(close.sum()), cost, covariance, ties)
+
+
+def _unseen_cost(cluster: Float, placed: PlacedLadder) -> float:
+    """Return the cost of the parts of a ladder above the water that the laser should see and does not.
+
+    Rungs alone may fit one gap higher or lower; then the ladder would end elsewhere.
+    """
+    begin, end = placed.elements()
+    low, high = placed.ladder.height[[0, -1]]
+    begin[:2, 1], end[:2, 1] = low, high  # how far the stiles go beyond the rungs is not known
+    share = np.linspace(0.0, 1.0, DOTS)
+    dots = placed.to_space((begin[:, None] + share[None, :, None] * (end - begin)[:, None]).reshape(-1, 3))
+    length = np.repeat(np.linalg.norm(end - begin, axis=1) / DOTS, DOTS)
+    visible = (dots[:, 2] > MIN_HEIGHT + UNSEEN_MARGIN) & (dots[:, 2] < MAX_HEIGHT - UNSEEN_MARGIN)
+    away, _ = cKDTree(cluster).query(dots[visible], distance_upper_bound=UNSEEN_REACH)
+    return float(length[visible][~np.isfinite(away)].sum()) / UNSEEN_LENGTH
 
 
 def _stiles(cluster: Float, out: Float, ladder: Ladder) -> PlacedLadder | None:

@@ -27,6 +27,7 @@ BARS_BEAMS = 4.0  # beams across a bar whose errors are independent: beams that 
 WATERLINE_NOISE = 0.025  # m: half a bin, and half of the rest of half a beam
 WATERLINE_SHARED = 0.01  # m
 WATER_MOVEMENT = 0.015  # m of the water between two scans
+FIRMNESS = 30.0  # factor by which a height is held that only the water gives
 MAX_UPRIGHT = 0.4  # greatest vertical component of the normal of an upright wall
 PROFILE_SPACING, PROFILE_NOISE = 0.15, 0.01  # m between a patch and the plan's nearest point, along the wall; m of the plan
 PROFILE_STRETCH, PROFILE_SHARED = 0.5, 0.01  # m of a flank or recess; m, its common error above and below the water
@@ -295,11 +296,13 @@ def profile_rows(patches: Patches, pose: Pose, walls: Walls, scan: int, within: 
     )  # fmt: skip
 
 
-def waterline_rows(level: Float, pose: Pose, bias: float, scan: int, column: int) -> Rows | None:
+def waterline_rows(level: Float, pose: Pose, bias: float, scan: int, column: int, *, firm: bool) -> Rows | None:
     """Return heights of points (k, 3) of a scan at the water's level, file's axes, over the water.
 
     ``bias`` m is common to all scans. The water may have moved between scans: the last row, of the mean height, has that
-    uncertainty; the others state only that the water is level.
+    uncertainty; the others state only that the water is level. With ``firm`` the last row weighs more than it is certain: of a
+    scan without ladders nothing else gives the height. Battered walls only seem to: an error of a few millimetres of all of
+    them is decimetres of height.
     """
     if len(level) == 0:
         return None
@@ -312,7 +315,7 @@ def waterline_rows(level: Float, pose: Pose, bias: float, scan: int, column: int
     common[-1] = -1.0
     return Rows(
         np.append(height - height.mean(), height.mean()),
-        np.append(np.full(len(level), WATERLINE_NOISE), np.hypot(noise, WATER_MOVEMENT)),
+        np.append(np.full(len(level), WATERLINE_NOISE), np.hypot(noise, WATER_MOVEMENT) / (FIRMNESS if firm else 1.0)),
         np.vstack([design - mean, mean]), scan, None, None, common, np.array([column]), np.arange(len(level) + 1),
         np.append(np.full(len(level), WATERLINE_SHARED / np.sqrt(len(level))), WATER_MOVEMENT), "waterline", "",
     )  # fmt: skip

@@ -21,7 +21,7 @@ from tunneldb.registration.underwater.walls import Walls
 from tunneldb.registration.underwater.water_surface import is_upside_down
 
 HEIGHT_TOLERANCE = 0.45  # m between the water in a scan and the laser's water level
-MAX_LADDER_CANDIDATES, MAX_PLAN_CANDIDATES = 8, 12  # candidates of a scan that are fitted
+MAX_LADDER_CANDIDATES, MAX_PLAN_CANDIDATES = 8, 20  # candidates of a scan that are fitted
 FIT_POINTS = 60_000
 LEVEL_POINTS = 120_000  # points of a scan that are levelled and compared with ladders and other scans
 FIRST_REACHES = (0.35, 0.25, 0.2, 0.15, 0.12)
@@ -30,13 +30,13 @@ MAX_SCALE_ERROR = 0.03  # greatest relative error of the sonar's speed of sound:
 MIN_LEVEL_POINTS, MAX_WATER_ERROR = 6, 0.2  # least number of points at the water; its greatest error, m (less than a rung)
 SURFACE_SIGMA, EDGE_SIGMA = 0.05, 0.15  # standard deviations of the water's level, by its surface and by edges of walls, m
 PLACE_TOLERANCE, TURN_TOLERANCE = 0.15, np.radians(3.0)  # differences of two candidates with the same pose
-MIN_AIR_HEIGHT, MAX_AIR_SHARE = 0.2, 0.15  # height above the water, m; greatest share of a scan's points above it
+MIN_AIR_HEIGHT, MAX_AIR_SHARE = 0.2, 0.25  # height above the water, m; greatest share of a scan's points above it
 MAX_MIRROR_SHARE = 0.4  # greatest share if the water's surface mirrors walls and bed
 MAX_LADDER_RANGE = 12.0  # m from the scanner
 SIGHT_RANGE = 7.0  # m: a closer ladder must be visible, or the pose is unlikely: its bars are two beams apart
 MISSED_LOG_ODDS = float(np.log(0.05))  # of a pose at which a ladder in sight is not seen
 MAX_LEVEL_POINTS = 40  # of the water's surface that are used
-MIN_PLAN_SCORE = 0.45  # least weighted share of a scan's walls that match the laser's plan
+MIN_PLAN_SCORE = 0.15  # least weighted share of a scan's walls that match the laser's plan
 MAX_SLIDE = 1.0  # m by which a fit may move a candidate
 
 

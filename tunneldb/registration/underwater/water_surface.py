@@ -31,8 +31,9 @@ def find_surface(points: Float, walls: tuple[float, float], top: float) -> Float
         Height of the upper edges of the walls, m.
     """
     high, low = _above_and_below(points, walls)
+    near_top, _ = _above_and_below(points[np.abs(points[:, 2] - top) < MAX_EDGE_ERROR], walls)
     both = {place: 0.5 * (z + low[place]) for place, z in high.items() if place in low}
-    surface, mirror, (_, bed_spread) = _flat(high), _flat(both), _flat(low)
+    surface, mirror, (_, bed_spread) = _flat(near_top), _flat(both), _flat(low)
     shown = [points for points, spread in (surface, mirror) if spread < min(MAX_SPREAD, MAX_SPREAD_RATIO * bed_spread)]
     fitting = [one for one in shown if abs(float(np.median(one[:, 2])) - top) < MAX_EDGE_ERROR]
     return min(fitting, key=lambda one: abs(float(np.median(one[:, 2])) - top), default=np.zeros((0, 3)))
