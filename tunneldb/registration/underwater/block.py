@@ -33,7 +33,6 @@ from tunneldb.registration.underwater.walls import Walls, find_walls, lower_edge
 
 WALL_VOXEL = 0.03  # m
 MIN_MOVEMENT_SIGMA = 2.5  # standard deviations from which a ladder has moved between laser and sonar
-MIN_OPEN_HEIGHT = 0.1  # m between possible poses from which the height is open
 MAX_DRY_WALL = 0.1  # m: if the laser sees walls this far below the given water level, the level is wrong
 
 
@@ -85,10 +84,11 @@ def register(laser: Float, clouds: Sequence[SonarCloud], ladders: Sequence[Ladde
         if state == "determined" and set(started[i].ladders) & set(moved):
             state, open_directions = "weak", (*open_directions, "ladders disagree")
         residuals = _residuals(adjusted.rows, k, [clouds[j].path.name for j in known])
+        here = (Alternative(pose.rotation, pose.translation + origin, pose.scale, 1.0),) if state == "undetermined" else ()
         poses.append(
             SonarPose(
                 cloud.path, pose.rotation, pose.translation + origin, pose.scale, adjusted.covariance[k], state,
-                open_directions, residuals, (), _walls_of(scans[i]),
+                open_directions, residuals, here, _walls_of(scans[i]),
             )
         )  # fmt: skip
     notes += [f"ladder {one.placed.ladder.name}: its gaps also fit {_shifts(one)} m higher" for one in found if one.ties]
@@ -97,7 +97,7 @@ def register(laser: Float, clouds: Sequence[SonarCloud], ladders: Sequence[Ladde
         for k in moved
     ]
     why = [
-        f"{scan.path.name} is open {', '.join(scan.undetermined)}: nothing that it shows determines this"
+        f"{scan.path.name} is not determined {', '.join(scan.undetermined)}"
         for scan in poses
         if scan.state == "undetermined" and np.isfinite(scan.scale)
     ]
@@ -195,7 +195,7 @@ def _open_directions(alternatives: Sequence[Alternative]) -> tuple[str, ...]:
     ahead = np.array([one.rotation[:2, 0] for one in alternatives])
     names = {
         "along the tunnel": np.ptp(place[:, :2], axis=0).max() > MIN_OPEN_SHIFT,
-        "height": np.ptp(place[:, 2]) > MIN_OPEN_HEIGHT,
+        "height": np.ptp(place[:, 2]) > MIN_OPEN_SHIFT,
         "half turn": (ahead @ ahead[0]).min() < 0.0,
     }
     return tuple(name for name, is_open in names.items() if is_open)

@@ -6,7 +6,7 @@ import numpy as np
 
 from tunneldb.arrays import Float
 
-MIN_WEAK_SHIFT, MIN_OPEN_SHIFT = 0.05, 0.5  # standard deviations of a position from which it is weak, and undetermined, m
+MIN_WEAK_SHIFT, MIN_OPEN_SHIFT = 0.05, 0.1  # standard deviations of a position from which it is weak, and undetermined, m
 MIN_WEAK_TURN, MIN_OPEN_TURN = np.radians(0.2), np.radians(3.0)
 MIN_WEAK_SCALE = 0.005
 

@@ -7,7 +7,7 @@ initial values for a fit of the whole ladder, with known rung heights, by its si
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
@@ -25,8 +25,6 @@ from tunneldb.registration.underwater.walls import Walls
 WALL_DISTANCE = (0.05, 1.2)  # distance of a ladder from its wall, m
 MAX_HEIGHT = 2.5  # above the water, m
 MIN_HEIGHT = 0.03  # m above the water; below that, waves and mirror images disturb
-MAX_LINK = 0.06  # m between neighbouring points of a ladder
-NEIGHBOUR_RADIUS, MIN_NEIGHBOURS = 0.08, 6  # m: two diameters of a bar; points in it
 MAX_FLATNESS = 0.5  # ratio of variances on a bar, also where two bars meet; on a surface the variances are similar
 MIN_LADDER_HEIGHT = 0.3  # of a ladder above the water, m
 MAX_POINTS = 4000
@@ -35,6 +33,7 @@ LEANING = np.radians(np.arange(-15.0, 15.1, 0.5))  # sideways
 BIN = 0.005  # m
 NOISE = 0.004  # expected noise of laser points on a cylinder, m
 STARTS = 8
+MAX_LADDERS = 6  # after which a cluster that none fits is no ladder
 DOTS = 40  # along each bar
 UNSEEN_MARGIN, UNSEEN_REACH = 0.1, 0.06  # m from the limits of height; m around a dot
 UNSEEN_LENGTH = 0.05  # m of a bar that is not seen, for a log likelihood of 1
@@ -43,6 +42,19 @@ POINTS_PER_OBSERVATION = 5.0  # one point in this many has an independent error
 MAX_COST_SHARE = 0.5  # share of the cost of outliers from which a first fit is not a ladder
 MAX_RUNG_ERROR = 0.01  # m; median distance of points between the stiles from expected rungs, above which the gaps differ
 OUTLIER_SIGMA = 5.0  # standard deviations from which a point does not belong to the ladder
+
+
+@dataclass(frozen=True)
+class Links:
+    """How points are linked: greatest distance, m; radius, m, and number of the points that show the direction of a bar."""
+
+    link: float
+    radius: float
+    neighbours: int
+
+
+LINKS = (Links(0.06, 0.08, 6), Links(0.12, 0.14, 4))  # two diameters of a bar; and wider ones, for bars with few points
+SURROUNDINGS = 0.3  # m around a ladder that was found
 
 
 @dataclass(frozen=True)
@@ -75,9 +87,32 @@ class LaserLadder:
 
 
 def find_laser_ladders(points: Float, walls: Walls, ladders: Sequence[Ladder]) -> list[LaserLadder]:
-    """Find and fit ladders in laser points (n, 3), local frame with the water at zero; ladders not found are omitted."""
-    clusters = _clusters(points, walls)
-    fits = [[_fit_cluster(cluster, out, ladder) for ladder in ladders] for cluster, out in clusters]
+    """Find and fit ladders in laser points (n, 3), local frame with the water at zero; ladders not found are omitted.
+
+    Ladders that few points show are searched afterwards, with wider links between points.
+    """
+    found: list[LaserLadder] = []
+    for links in LINKS:
+        names = {one.placed.ladder.name for one in found}
+        left = [ladder for ladder in ladders if ladder.name not in names]
+        if left:
+            found += _assigned(_clusters(_away_from(points, found), walls, links), left)
+    order = {ladder.name: k for k, ladder in enumerate(ladders)}
+    return sorted(found, key=lambda one: order[one.placed.ladder.name])
+
+
+def _away_from(points: Float, found: Sequence[LaserLadder]) -> Float:
+    """Return the points (n, 3) that are not around ladders found already."""
+    away = np.ones(len(points), np.bool_)
+    for one in found:
+        own = one.placed.to_ladder(points)
+        away &= (np.abs(own[:, 0]) > one.placed.gap / 2.0 + SURROUNDINGS) | (np.abs(own[:, 2]) > SURROUNDINGS)
+    return points[away]
+
+
+def _assigned(clusters: Sequence[tuple[Float, Float]], ladders: Sequence[Ladder]) -> list[LaserLadder]:
+    """Return the fits of ladders to clusters, each to one, with the greatest evidence in all."""
+    fits = [_fits(cluster, out, ladders) for cluster, out in clusters]
     if not fits:
         return []
     # evidence for a ladder, relative to outliers
@@ -90,26 +125,48 @@ def find_laser_ladders(points: Float, walls: Walls, ladders: Sequence[Ladder]) -
     return [fit for fit in found if fit is not None]
 
 
+def _fits(cluster: Float, out: Float, ladders: Sequence[Ladder]) -> list[LaserLadder | None]:
+    """Return the fit of each ladder to a cluster; None where it is not that ladder."""
+    starts: dict[tuple[float, float], PlacedLadder | None] = {}
+    options = []
+    for k, ladder in enumerate(ladders):
+        shape = (ladder.stile_gap, ladder.diameter)
+        if shape not in starts:
+            starts[shape] = _stiles(cluster, out, ladder)
+        start = starts[shape]
+        if start is not None:
+            shifts = _shifts(start.to_ladder(cluster), ladder, start.gap)
+            if shifts:
+                options.append((shifts[0][0], k, replace(start, ladder=ladder), [shift for _, shift in shifts]))
+    options.sort(key=lambda one: -one[0])
+    fits: list[LaserLadder | None] = [None] * len(ladders)
+    for place, (_, k, start, heights) in enumerate(options):
+        if place == MAX_LADDERS and not any(fits):
+            break  # it is no ladder; otherwise all are compared, since they look alike
+        fits[k] = _fit_cluster(cluster, start, heights)
+    return fits
+
+
 def _astray(points: int) -> float:
     """Return the cost of points that are all outliers."""
     return 0.5 * min(points, MAX_POINTS) * float(np.log1p(OUTLIER_SIGMA**2)) / POINTS_PER_OBSERVATION
 
 
-def _clusters(points: Float, walls: Walls) -> list[tuple[Float, Float]]:
+def _clusters(points: Float, walls: Walls, links: Links) -> list[tuple[Float, Float]]:
     """Return clusters in front of the walls that may be ladders: points (n, 3), and the direction (3,) to the water."""
     near = points[(points[:, 2] > MIN_HEIGHT) & (points[:, 2] < MAX_HEIGHT)]
     away, piece = walls.tree.query(near[:, :2], distance_upper_bound=WALL_DISTANCE[1] + 0.5)
     known = np.isfinite(away)
-    near, piece = _thin(near[known], piece[known], MAX_LINK / 3.0)
+    near, piece = _thin(near[known], piece[known], LINKS[0].link / 3.0)
     off = walls.distance(near, piece)
-    near_wall = (off > -NEIGHBOUR_RADIUS) & (off < WALL_DISTANCE[1] + NEIGHBOUR_RADIUS)
+    near_wall = (off > -links.radius) & (off < WALL_DISTANCE[1] + links.radius)
     near, piece, off = near[near_wall], piece[near_wall], off[near_wall]
     bars = (off > WALL_DISTANCE[0]) & (off < WALL_DISTANCE[1])
-    bars[bars] = _elongated(near, bars)
+    bars[bars] = _elongated(near, bars, links)
     near, piece = near[bars], piece[bars]
     if len(near) == 0:
         return []
-    pairs = cKDTree(near).query_pairs(MAX_LINK, output_type="ndarray")
+    pairs = cKDTree(near).query_pairs(links.link, output_type="ndarray")
     count = len(near)
     _, label = connected_components(coo_array((np.ones(len(pairs)), pairs.T), (count, count)), directed=False)
     out = []
@@ -121,13 +178,13 @@ def _clusters(points: Float, walls: Walls) -> list[tuple[Float, Float]]:
     return out
 
 
-def _elongated(points: Float, which: Bool) -> Bool:
+def _elongated(points: Float, which: Bool, links: Links) -> Bool:
     """Return True for some of the points (n, 3) if they lie on bars rather than surfaces, by the principal axes around each.
 
     Otherwise a vault or a boat in front of the wall would be one cluster with the ladder that leans on it.
     """
     tree = cKDTree(points)
-    pairs = cKDTree(points[which]).sparse_distance_matrix(tree, NEIGHBOUR_RADIUS, output_type="coo_matrix")
+    pairs = cKDTree(points[which]).sparse_distance_matrix(tree, links.radius, output_type="coo_matrix")
     count = int(which.sum())
     about = coo_array((np.ones(pairs.nnz), (pairs.row, pairs.col)), (count, len(points))).tocsr()
     number = np.asarray(about.sum(axis=1))
@@ -136,7 +193,7 @@ def _elongated(points: Float, which: Bool) -> Bool:
     square = (centred[:, :, None] * centred[:, None]).reshape(-1, 9)
     spread = (about @ square / number[:, None]).reshape(-1, 3, 3) - mean[:, :, None] * mean[:, None]
     size = np.linalg.eigvalsh(spread)
-    return np.asarray((number >= MIN_NEIGHBOURS) & (size[:, 1] < MAX_FLATNESS * size[:, 2]))
+    return np.asarray((number >= links.neighbours) & (size[:, 1] < MAX_FLATNESS * size[:, 2]))
 
 
 def _thin(points: Float, piece: Int64, edge: float) -> tuple[Float, Int64]:
@@ -145,15 +202,13 @@ def _thin(points: Float, piece: Int64, edge: float) -> tuple[Float, Int64]:
     return points[first], piece[first]
 
 
-def _fit_cluster(cluster: Float, out: Float, ladder: Ladder) -> LaserLadder | None:
-    """Fit a ladder to a cluster; return None if it is not a ladder."""
-    start = _stiles(cluster, out, ladder)
-    if start is None:
-        return None
+def _fit_cluster(cluster: Float, start: PlacedLadder, shifts: Sequence[float]) -> LaserLadder | None:
+    """Fit a ladder to a cluster from several heights of its zero; return None if it is not a ladder."""
+    ladder = start.ladder
     order = np.random.default_rng(0).permutation(len(cluster))
     few, cluster = cluster[order[:FIRST_FIT_POINTS]], cluster[order[:MAX_POINTS]]
     tried: list[tuple[float, PlacedLadder]] = []
-    for shift in _shifts(start.to_ladder(cluster), ladder, start.gap):
+    for shift in shifts:
         cost, fitted, _ = _refine(few, start.moved(np.zeros(3), start.axes[1] * shift), 10)
         tried.append((cost, fitted))
     if min((cost for cost, _ in tried), default=np.inf) > MAX_COST_SHARE * _astray(len(few)):
@@ -247,8 +302,8 @@ def _stiles(cluster: Float, out: Float, ladder: Ladder) -> PlacedLadder | None:
     return PlacedLadder(ladder, origin, np.vstack([turned_across, turned_up, normal]), gap)
 
 
-def _shifts(own: Float, ladder: Ladder, gap: float) -> list[float]:
-    """Return possible heights of the ladder's zero at which rungs match the points between the stiles, most likely first."""
+def _shifts(own: Float, ladder: Ladder, gap: float) -> list[tuple[float, float]]:
+    """Return how well rungs match the points between the stiles at possible heights of the ladder's zero, the best first."""
     inside = np.abs(own[:, 0]) < gap / 2.0 - ladder.diameter
     if inside.sum() < 10:
         return []
@@ -261,12 +316,12 @@ def _shifts(own: Float, ladder: Ladder, gap: float) -> list[float]:
     k = np.round((at - low) / BIN).astype(np.int64)
     visible = (k >= 0) & (k < len(smooth))
     score = np.where(visible, smooth[np.clip(k, 0, len(smooth) - 1)] - smooth.mean(), 0.0).sum(axis=1)
-    chosen: list[float] = []
+    chosen: list[tuple[float, float]] = []
     for i in np.argsort(-score):
         if score[i] <= 0.0 or len(chosen) == STARTS:
             break
-        if all(abs(zero[i] - other) > 0.05 for other in chosen):
-            chosen.append(float(zero[i]))
+        if all(abs(zero[i] - other) > 0.05 for _, other in chosen):
+            chosen.append((float(score[i]), float(zero[i])))
     return chosen
 
 
