@@ -64,7 +64,7 @@ def register(laser: Float, clouds: Sequence[SonarCloud], ladders: Sequence[Ladde
     found = find_laser_ladders(local, walls, ladders)
     scans, faults = _prepare([_local(cloud, origin) for cloud in clouds], walls)
     seen = {one.placed.ladder.name for one in found}
-    first = find_first_poses(scans, walls, found, several=len(ladders) > 1)
+    first = find_first_poses(scans, walls, found, unseen=len(ladders) > len(found))
     started = first.started
     notes = []
     if edge > MAX_DRY_WALL:

@@ -29,14 +29,14 @@ class FirstPoses:
 
 
 def find_first_poses(
-    scans: Mapping[int, PreparedScan], walls: Walls, found: Sequence[LaserLadder], *, several: bool
+    scans: Mapping[int, PreparedScan], walls: Walls, found: Sequence[LaserLadder], *, unseen: bool
 ) -> FirstPoses:
     """Find first poses by what each scan shows of walls and ladders, and by the beds that they share, as far as possible.
 
     Parameters
     ----------
-    several : bool
-        True if more than one ladder stands in the water, visible to the laser or not.
+    unseen : bool
+        True if there are ladders in the water that the laser does not show.
 
     Raises
     ------
@@ -68,7 +68,7 @@ def find_first_poses(
             reasons[i] = "several poses fit; choose one by --start"
         else:
             started[i] = some[best]
-    started = _agreeing(reliefs, started, reasons, walls, several=several)
+    started = _agreeing(reliefs, started, reasons, walls, unseen=unseen)
     left = [i for i in scans if i not in started]
     placed: dict[int, tuple[Hypothesis, float]] = {}
     new = list(started)
@@ -83,7 +83,7 @@ def find_first_poses(
         started |= {i: placed.pop(i)[0] for i in new}
         left = [i for i in left if i not in started]
     reasons = {i: reason for i, reason in reasons.items() if i not in started}
-    started = _agreeing(reliefs, started, reasons, walls, several=several)
+    started = _agreeing(reliefs, started, reasons, walls, unseen=unseen)
     alternatives = {i: _likely(some, likely[i]) for i, some in options.items() if i not in started}
     return FirstPoses(started, reasons, alternatives)
 
@@ -100,12 +100,12 @@ def _agreeing(
     reasons: dict[int, str],
     walls: Walls,
     *,
-    several: bool,
+    unseen: bool,
 ) -> dict[int, Hypothesis]:
     """Return the scans that do not contradict each other where they see the same bed, since ladders look alike.
 
-    ``reasons`` gets the reasons for the others. With ``several`` ladders, a scan that sees only one may have confused it with
-    another: its pose needs confirmation by another scan, or by the place given by the operator.
+    ``reasons`` gets the reasons for the others. With ``unseen`` ladders, a scan that sees only one may have confused it with
+    one of these: its pose needs confirmation by the plan, by another scan, or by the place given by the operator.
     """
     kept = dict(started)
     agreements = {
@@ -127,10 +127,10 @@ def _agreeing(
         for i in [i for i, (for_it, no) in against.items() if for_it - no == worst]:
             del kept[i]
             reasons[i] = "its bed differs from the bed that other scans show there"
-    if several:
+    if unseen:
         unconfirmed = {i: one for i, one in kept.items() if len(one.ladders) < 2 and not one.by_plan}
         alone = [i for i in unconfirmed if reliefs.scans[i].cloud.near is None]
         for i in [i for i in alone if not votes(i)[0]]:
             del kept[i]
-            reasons[i] = "it sees only one ladder, which may be confused with another; give its place by --start"
+            reasons[i] = "it sees only one ladder, which may be one that the laser does not show; give its place by --start"
     return kept
