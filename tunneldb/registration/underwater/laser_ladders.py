@@ -92,11 +92,12 @@ def find_laser_ladders(points: Float, walls: Walls, ladders: Sequence[Ladder]) -
     Ladders that few points show are searched afterwards, with wider links between points.
     """
     found: list[LaserLadder] = []
+    shown = cKDTree(points[(points[:, 2] > 0.0) & (points[:, 2] < MAX_HEIGHT)])
     for links in LINKS:
         names = {one.placed.ladder.name for one in found}
         left = [ladder for ladder in ladders if ladder.name not in names]
         if left:
-            found += _assigned(_clusters(_away_from(points, found), walls, links), left)
+            found += _assigned(_clusters(_away_from(points, found), walls, links), left, shown)
     order = {ladder.name: k for k, ladder in enumerate(ladders)}
     return sorted(found, key=lambda one: order[one.placed.ladder.name])
 
@@ -110,9 +111,9 @@ def _away_from(points: Float, found: Sequence[LaserLadder]) -> Float:
     return points[away]
 
 
-def _assigned(clusters: Sequence[tuple[Float, Float]], ladders: Sequence[Ladder]) -> list[LaserLadder]:
+def _assigned(clusters: Sequence[tuple[Float, Float]], ladders: Sequence[Ladder], shown: cKDTree) -> list[LaserLadder]:
     """Return the fits of ladders to clusters, each to one, with the greatest evidence in all."""
-    fits = [_fits(cluster, out, ladders) for cluster, out in clusters]
+    fits = [_fits(cluster, out, ladders, shown) for cluster, out in clusters]
     if not fits:
         return []
     # evidence for a ladder, relative to outliers
@@ -125,7 +126,7 @@ def _assigned(clusters: Sequence[tuple[Float, Float]], ladders: Sequence[Ladder]
     return [fit for fit in found if fit is not None]
 
 
-def _fits(cluster: Float, out: Float, ladders: Sequence[Ladder]) -> list[LaserLadder | None]:
+def _fits(cluster: Float, out: Float, ladders: Sequence[Ladder], shown: cKDTree) -> list[LaserLadder | None]:
     """Return the fit of each ladder to a cluster; None where it is not that ladder."""
     starts: dict[tuple[float, float], PlacedLadder | None] = {}
     options = []
@@ -143,7 +144,7 @@ def _fits(cluster: Float, out: Float, ladders: Sequence[Ladder]) -> list[LaserLa
     for place, (_, k, start, heights) in enumerate(options):
         if place == MAX_LADDERS and not any(fits):
             break  # it is no ladder; otherwise all are compared, since they look alike
-        fits[k] = _fit_cluster(cluster, start, heights)
+        fits[k] = _fit_cluster(cluster, start, heights, shown)
     return fits
 
 
@@ -202,7 +203,7 @@ def _thin(points: Float, piece: Int64, edge: float) -> tuple[Float, Int64]:
     return points[first], piece[first]
 
 
-def _fit_cluster(cluster: Float, start: PlacedLadder, shifts: Sequence[float]) -> LaserLadder | None:
+def _fit_cluster(cluster: Float, start: PlacedLadder, shifts: Sequence[float], shown: cKDTree) -> LaserLadder | None:
     """Fit a ladder to a cluster from several heights of its zero; return None if it is not a ladder."""
     ladder = start.ladder
     order = np.random.default_rng(0).permutation(len(cluster))
@@ -215,9 +216,7 @@ def _fit_cluster(cluster: Float, start: PlacedLadder, shifts: Sequence[float]) -
         return None
     tried.sort(key=lambda one: one[0])
     refined = [_refine(cluster, start, 40) for _, start in tried]
-    refined = sorted(
-        ((cost + _unseen_cost(cluster, one), one, spread) for cost, one, spread in refined), key=lambda one: one[0]
-    )
+    refined = sorted(((cost + _unseen_cost(shown, one), one, spread) for cost, one, spread in refined), key=lambda one: one[0])
     cost, placed, covariance = refined[0]
     own = placed.to_ladder(cluster)
     which, away = nearest_element(own, placed)
@@ -243,7 +242,7 @@ def _fit_cluster(cluster: Float, start: PlacedLadder, shifts: Sequence[float]) -
     return LaserLadder(placed, rms, tuple(ladder.number[i] for i in seen), int(close.sum()), cost, covariance, ties)
 
 
-def _unseen_cost(cluster: Float, placed: PlacedLadder) -> float:
+def _unseen_cost(shown: cKDTree, placed: PlacedLadder) -> float:
     """Return the cost of the parts of a ladder above the water that the laser should see and does not.
 
     Rungs alone may fit one gap higher or lower; then the ladder would end elsewhere.
@@ -255,7 +254,7 @@ def _unseen_cost(cluster: Float, placed: PlacedLadder) -> float:
     dots = placed.to_space((begin[:, None] + share[None, :, None] * (end - begin)[:, None]).reshape(-1, 3))
     length = np.repeat(np.linalg.norm(end - begin, axis=1) / DOTS, DOTS)
     visible = (dots[:, 2] > MIN_HEIGHT + UNSEEN_MARGIN) & (dots[:, 2] < MAX_HEIGHT - UNSEEN_MARGIN)
-    away, _ = cKDTree(cluster).query(dots[visible], distance_upper_bound=UNSEEN_REACH)
+    away, _ = shown.query(dots[visible], distance_upper_bound=UNSEEN_REACH)
     return float(length[visible][~np.isfinite(away)].sum()) / UNSEEN_LENGTH
 
 

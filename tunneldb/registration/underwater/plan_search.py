@@ -9,7 +9,7 @@ place along the canal open.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.fft import irfft2, next_fast_len, rfft2
@@ -36,6 +36,8 @@ PEAK_DISTANCE = 0.4  # m
 ROUNDS = 8  # of the fit in plan
 FIT_REACH = (0.4, 0.3, 0.25, 0.2, 0.15, 0.15, 0.1, 0.1)  # m
 SIGMA = 0.05  # m of a distance in plan
+SCALE_SIGMA, FEATURES = 0.015, 10.0  # standard deviation of the scale; number of independent features of a plan
+MAX_CHANGE = np.array([0.3, 0.3, 0.05, 0.01])  # of place, m, heading, rad, and scale in one round
 
 
 @dataclass(frozen=True)
@@ -49,11 +51,12 @@ class PlanCells:
 
 @dataclass(frozen=True)
 class PlanPose:
-    """Heading, rad, and place (2,) in plan, m, of a level scan; ``score`` is the weighted share of its walls that match."""
+    """Heading, rad, place (2,) in plan, m, and scale of a level scan; ``score``: weighted share of its walls that match."""
 
     heading: float
     place: Float
     score: float
+    scale: float = 1.0
 
     def turn(self) -> Float:
         """Return the rotation (2, 2) from the level scan to the tunnel."""
@@ -195,22 +198,25 @@ def _apart(poses: list[PlanPose], most: int) -> list[PlanPose]:
 
 def _fitted(cells: PlanCells, pose: PlanPose, profile: Profile) -> PlanPose:
     """Return a pose fitted to the plan, point to line, and its weighted share of matching walls."""
+    prior = np.diag(cells.weight.sum() * np.array([1e-6, 1e-6, 1e-5, SIGMA**2 / SCALE_SIGMA**2 / FEATURES]))
     for reach in FIT_REACH:
         place, residual, normal, weight = _compared(cells, pose, profile)
         used = weight * (np.abs(residual) < 3.0 * reach) / (1.0 + (residual / reach) ** 2) ** 2
         arm = place - pose.place
-        design = np.column_stack([normal, arm[:, 0] * normal[:, 1] - arm[:, 1] * normal[:, 0]])
+        turn = arm[:, 0] * normal[:, 1] - arm[:, 1] * normal[:, 0]
+        design = np.column_stack([normal, turn, (arm * normal).sum(axis=1) / pose.scale])
         weighted = design * used[:, None]
-        matrix = weighted.T @ design + 1e-3 * float(cells.weight.sum()) * np.diag([1.0, 1.0, 10.0]) * 1e-3
-        change = np.clip(-np.linalg.solve(matrix, weighted.T @ residual), -0.3, 0.3)
-        pose = PlanPose(pose.heading + float(np.clip(change[2], -0.05, 0.05)), pose.place + change[:2], 0.0)
+        right = weighted.T @ residual + prior @ np.array([0.0, 0.0, 0.0, pose.scale - 1.0])
+        change = -np.linalg.solve(weighted.T @ design + prior, right)
+        change = np.clip(change, -MAX_CHANGE, MAX_CHANGE)
+        pose = PlanPose(pose.heading + float(change[2]), pose.place + change[:2], 0.0, pose.scale + float(change[3]))
     _, residual, _, weight = _compared(cells, pose, profile)
-    return PlanPose(pose.heading, pose.place, float((weight / (1.0 + (residual / SIGMA) ** 2)).sum()))
+    return replace(pose, score=float((weight / (1.0 + (residual / SIGMA) ** 2)).sum()))
 
 
 def _compared(cells: PlanCells, pose: PlanPose, profile: Profile) -> tuple[Float, Float, Float, Float]:
     """Return places, distances from the plan along its normals, these normals, and weights with the agreement of normals."""
-    place, normal = cells.place @ pose.turn().T + pose.place, cells.normal @ pose.turn().T
+    place, normal = pose.scale * cells.place @ pose.turn().T + pose.place, cells.normal @ pose.turn().T
     away, k = profile.tree.query(place, distance_upper_bound=1.0)
     known = np.isfinite(away)
     k = np.where(known, k, 0)

@@ -15,9 +15,9 @@ from tunneldb.arrays import Bool, Float, Int64
 from tunneldb.robust import MAD_TO_SIGMA
 
 FOOT, HEAD = 0.02, 0.35  # heights of the laser's points, m
-CELL = 0.04  # m in plan
+CELLS = (0.04, 0.12)  # m in plan
 MIN_POINTS, MIN_HEIGHT = 3, 0.08  # of a cell; m between its lowest and highest point
-NORMAL_RADIUS, NORMAL_CELLS = 0.16, 4  # m; least number of cells from which a normal is computed
+NORMAL_RADIUS, NORMAL_CELLS = 4.0, 4  # of the cells that give a normal, in cells; their least number
 MAX_FLATNESS = 0.35  # ratio of the spreads across and along
 UPPER_FOOT, UPPER_HEAD = 0.5, 0.8  # heights, m, of the points that show how the plan changes with height
 STRETCH = 1.0  # m of wall that may have one batter
@@ -53,18 +53,23 @@ class Profile:
 
 
 def find_profile(points: Float) -> Profile:
-    """Return the plan of the laser's points (n, 3)."""
-    place = _upright_cells(points[(points[:, 2] > FOOT) & (points[:, 2] < HEAD)])
-    normal, _, flat = line_normals(place, NORMAL_RADIUS)
-    place, normal = place[flat], normal[flat]
+    """Return the plan of the laser's points (n, 3), in fine cells, and in wider ones where points are few."""
+    low = points[(points[:, 2] > FOOT) & (points[:, 2] < HEAD)]
+    place, normal = np.zeros((0, 2)), np.zeros((0, 2))
+    for cell in CELLS:
+        some = _upright_cells(low, cell)
+        if len(place) and len(some):
+            some = some[cKDTree(place).query(some)[0] > 2.0 * cell]
+        direction, _, flat = line_normals(some, NORMAL_RADIUS * cell)
+        place, normal = np.concatenate([place, some[flat]]), np.concatenate([normal, direction[flat]])
     return Profile(place, normal, _growth(points, place, normal))
 
 
-def _upright_cells(points: Float) -> Float:
-    """Return the mean places (k, 2) of the cells whose points reach from low to high."""
+def _upright_cells(points: Float, edge: float) -> Float:
+    """Return the mean places (k, 2) of the cells in plan whose points reach from low to high."""
     if len(points) == 0:
         return np.zeros((0, 2))
-    cell = np.floor(points[:, :2] / CELL).astype(np.int64)
+    cell = np.floor(points[:, :2] / edge).astype(np.int64)
     _, number, count = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
     number = number.ravel()
     low, high = np.full(len(count), np.inf), np.full(len(count), -np.inf)
@@ -98,7 +103,7 @@ def _growth(points: Float, place: Float, normal: Float) -> float:
     """Return how much the plan changes with height, apart from a common batter of each stretch; m/√m."""
     if len(place) == 0:
         return 0.0
-    upper = _upright_cells(points[(points[:, 2] > UPPER_FOOT) & (points[:, 2] < UPPER_HEAD)])
+    upper = _upright_cells(points[(points[:, 2] > UPPER_FOOT) & (points[:, 2] < UPPER_HEAD)], CELLS[0])
     if len(upper) == 0:
         return 0.0
     away, k = cKDTree(place).query(upper, distance_upper_bound=MAX_CHANGE)

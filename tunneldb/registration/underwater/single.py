@@ -185,7 +185,7 @@ def _pose_of(plan: PlanPose, flat: LevelScan) -> Pose:
     """Return the pose of a level scan at a place in plan, at the height given by the water."""
     turn = np.eye(3)
     turn[:2, :2] = plan.turn()
-    return Pose(turn @ flat.rotation, np.array([*plan.place, -flat.top]), 1.0)
+    return Pose(turn @ flat.rotation, np.array([*plan.place, -plan.scale * flat.top]), plan.scale)
 
 
 def _fit_to_ladder(
