@@ -15,11 +15,11 @@ import numpy as np
 from scipy.fft import irfft2, next_fast_len, rfft2
 from scipy.ndimage import gaussian_filter, maximum_filter
 
-from tunneldb.arrays import Float
+from tunneldb.arrays import Bool, Float
 from tunneldb.registration.underwater.first_pose import LevelScan
 from tunneldb.registration.underwater.observations import MAX_RANGE, Patches
 from tunneldb.registration.underwater.profile import Profile, line_normals
-from tunneldb.registration.underwater.results import SonarCloud
+from tunneldb.registration.underwater.results import Near, SonarCloud
 
 PIXEL = 0.1  # m
 BLUR = 0.08  # m: of either image
@@ -123,8 +123,7 @@ def find_plan_poses(cloud: SonarCloud, cells: PlanCells, profile: Profile) -> li
         return []
     found: list[PlanPose] = []
     for tile in _tiles(profile, cloud):
-        found += _in_tile(cells, tile)
-    found = [one for one in found if cloud.may_stand(one.place)]
+        found += _in_tile(cells, tile, cloud)
     fitted = [_fitted(cells, one, profile) for one in _apart(found, 2 * PEAKS)]
     return _apart([one for one in fitted if cloud.may_stand(one.place)], PEAKS)
 
@@ -142,7 +141,8 @@ def _tiles(profile: Profile, cloud: SonarCloud) -> Iterator[Profile]:
             yield Profile(profile.place[inside], profile.normal[inside], profile.growth)
 
 
-def _in_tile(cells: PlanCells, tile: Profile) -> list[PlanPose]:
+def _in_tile(cells: PlanCells, tile: Profile, cloud: SonarCloud) -> list[PlanPose]:
+    """Return the best places of each heading in a part of the plan, where the sonar may have stood."""
     low = tile.place.min(axis=0) - MARGIN
     shape = np.ceil((tile.place.max(axis=0) + MARGIN - low) / PIXEL).astype(int)
     scene = _channels(tile.place, tile.normal, np.ones(len(tile.place)), low, shape)
@@ -160,12 +160,22 @@ def _in_tile(cells: PlanCells, tile: Profile) -> list[PlanPose]:
         own = _channels(place, normal, cells.weight, own_low, own_shape)
         score = sum(irfft2(np.conj(s) * np.conj(rfft2(o, size)), size) for s, o in zip(spectrum, own, strict=True))
         score = 0.5 * np.asarray(score)
+        if cloud.near is not None:
+            score = np.where(_within(cloud.near, low - own_low, shape, score.shape), score, -np.inf)
         top = np.flatnonzero((score == maximum_filter(score, int(2 * PEAK_DISTANCE / PIXEL) + 1, mode="wrap")).ravel())
+        top = top[np.isfinite(score.ravel()[top])]
         for k in top[np.argsort(-score.ravel()[top])][:PEAKS_OF_HEADING]:
             i, j = np.unravel_index(int(k), score.shape)
             shift = np.array([i if i < shape[0] else i - size[0], j if j < shape[1] else j - size[1]]) * PIXEL
             out.append(PlanPose(float(heading), low + shift - own_low, float(score[i, j])))
     return out
+
+
+def _within(near: Near, origin: Float, shape: Float, size: tuple[int, ...]) -> Bool:
+    """Return True for the shifts of a correlation image of a size at which the sonar is where it may have stood."""
+    steps = [np.where(np.arange(n) < m, np.arange(n), np.arange(n) - n) * PIXEL for n, m in zip(size, shape, strict=True)]
+    x, y = (steps[k] + origin[k] - near.place[k] for k in (0, 1))
+    return np.asarray(np.hypot(x[:, None], y[None]) <= near.within)
 
 
 def _channels(place: Float, normal: Float, weight: Float, low: Float, shape: Float) -> Float:
