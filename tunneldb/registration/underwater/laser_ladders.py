@@ -35,25 +35,36 @@ NOISE = 0.004  # expected noise of laser points on a cylinder, m
 STARTS = 8
 MAX_LADDERS = 6  # after which a cluster that none fits is no ladder
 DOTS = 40  # along each bar
-UNSEEN_MARGIN, UNSEEN_REACH = 0.1, 0.06  # m from the limits of height; m around a dot
+UNSEEN_MARGIN, UNSEEN_REACH = 0.1, 0.025  # m from the limits of height; m around a bar
+ON_WALL = 0.025  # m
 UNSEEN_LENGTH = 0.05  # m of a bar that is not seen, for a log likelihood of 1
 MAX_TIE_LOG_RATIO = float(np.log(100.0))  # likelihood ratio up to which two solutions are ambiguous
 POINTS_PER_OBSERVATION = 5.0  # one point in this many has an independent error
 MAX_COST_SHARE = 0.5  # share of the cost of outliers from which a first fit is not a ladder
-MAX_RUNG_ERROR = 0.01  # m; median distance of points between the stiles from expected rungs, above which the gaps differ
 OUTLIER_SIGMA = 5.0  # standard deviations from which a point does not belong to the ladder
 
 
 @dataclass(frozen=True)
 class Links:
-    """How points are linked: greatest distance, m; radius, m, and number of the points that show the direction of a bar."""
+    """How points are linked to clusters, and when a cluster's rungs are those of a ladder.
+
+    Attributes
+    ----------
+    link : float
+        Greatest distance of neighbours, m.
+    radius, neighbours
+        Radius, m, and least number of the points that show the direction of a bar.
+    rung_error : float
+        Median distance of points between the stiles from expected rungs, above which the gaps differ, m.
+    """
 
     link: float
     radius: float
     neighbours: int
+    rung_error: float
 
 
-LINKS = (Links(0.06, 0.08, 6), Links(0.12, 0.14, 4))  # two diameters of a bar; and wider ones, for bars with few points
+LINKS = (Links(0.06, 0.08, 6, 0.01), Links(0.12, 0.14, 4, 0.007))  # two diameters of a bar; wider, for bars with few points
 SURROUNDINGS = 0.3  # m around a ladder that was found
 
 
@@ -92,14 +103,23 @@ def find_laser_ladders(points: Float, walls: Walls, ladders: Sequence[Ladder]) -
     Ladders that few points show are searched afterwards, with wider links between points.
     """
     found: list[LaserLadder] = []
-    shown = cKDTree(points[(points[:, 2] > 0.0) & (points[:, 2] < MAX_HEIGHT)])
+    shown = cKDTree(_before_walls(points[(points[:, 2] > 0.0) & (points[:, 2] < MAX_HEIGHT)], walls))
     for links in LINKS:
         names = {one.placed.ladder.name for one in found}
         left = [ladder for ladder in ladders if ladder.name not in names]
         if left:
-            found += _assigned(_clusters(_away_from(points, found), walls, links), left, shown)
+            found += _assigned(_clusters(_away_from(points, found), walls, links), left, shown, links)
     order = {ladder.name: k for k, ladder in enumerate(ladders)}
     return sorted(found, key=lambda one: order[one.placed.ladder.name])
+
+
+def _before_walls(points: Float, walls: Walls) -> Float:
+    """Return the points (n, 3) that are not on a wall."""
+    away, piece = walls.tree.query(points[:, :2], distance_upper_bound=WALL_DISTANCE[1] + 0.5)
+    known = np.isfinite(away)
+    off = np.full(len(points), np.inf)
+    off[known] = walls.distance(points[known], piece[known])
+    return points[off > ON_WALL]
 
 
 def _away_from(points: Float, found: Sequence[LaserLadder]) -> Float:
@@ -111,9 +131,11 @@ def _away_from(points: Float, found: Sequence[LaserLadder]) -> Float:
     return points[away]
 
 
-def _assigned(clusters: Sequence[tuple[Float, Float]], ladders: Sequence[Ladder], shown: cKDTree) -> list[LaserLadder]:
+def _assigned(
+    clusters: Sequence[tuple[Float, Float]], ladders: Sequence[Ladder], shown: cKDTree, links: Links
+) -> list[LaserLadder]:
     """Return the fits of ladders to clusters, each to one, with the greatest evidence in all."""
-    fits = [_fits(cluster, out, ladders, shown) for cluster, out in clusters]
+    fits = [_fits(cluster, out, ladders, shown, links) for cluster, out in clusters]
     if not fits:
         return []
     # evidence for a ladder, relative to outliers
@@ -126,7 +148,7 @@ def _assigned(clusters: Sequence[tuple[Float, Float]], ladders: Sequence[Ladder]
     return [fit for fit in found if fit is not None]
 
 
-def _fits(cluster: Float, out: Float, ladders: Sequence[Ladder], shown: cKDTree) -> list[LaserLadder | None]:
+def _fits(cluster: Float, out: Float, ladders: Sequence[Ladder], shown: cKDTree, links: Links) -> list[LaserLadder | None]:
     """Return the fit of each ladder to a cluster; None where it is not that ladder."""
     starts: dict[tuple[float, float], PlacedLadder | None] = {}
     options = []
@@ -144,7 +166,7 @@ def _fits(cluster: Float, out: Float, ladders: Sequence[Ladder], shown: cKDTree)
     for place, (_, k, start, heights) in enumerate(options):
         if place == MAX_LADDERS and not any(fits):
             break  # it is no ladder; otherwise all are compared, since they look alike
-        fits[k] = _fit_cluster(cluster, start, heights, shown)
+        fits[k] = _fit_cluster(cluster, start, heights, shown, links)
     return fits
 
 
@@ -203,7 +225,9 @@ def _thin(points: Float, piece: Int64, edge: float) -> tuple[Float, Int64]:
     return points[first], piece[first]
 
 
-def _fit_cluster(cluster: Float, start: PlacedLadder, shifts: Sequence[float], shown: cKDTree) -> LaserLadder | None:
+def _fit_cluster(
+    cluster: Float, start: PlacedLadder, shifts: Sequence[float], shown: cKDTree, links: Links
+) -> LaserLadder | None:
     """Fit a ladder to a cluster from several heights of its zero; return None if it is not a ladder."""
     ladder = start.ladder
     order = np.random.default_rng(0).permutation(len(cluster))
@@ -226,7 +250,7 @@ def _fit_cluster(cluster: Float, start: PlacedLadder, shifts: Sequence[float], s
         return None
     inside = np.abs(own[:, 0]) < placed.gap / 2.0 - ladder.diameter
     between = close & inside
-    if not inside.any() or float(np.median(np.abs(residual[inside]))) > MAX_RUNG_ERROR:  # its gaps differ
+    if not inside.any() or float(np.median(np.abs(residual[inside]))) > links.rung_error:  # its gaps differ
         return None
     counts = np.bincount(which[between], minlength=len(ladder.height) + 2)
     seen = np.flatnonzero(counts[2:] >= 5)
@@ -254,7 +278,7 @@ def _unseen_cost(shown: cKDTree, placed: PlacedLadder) -> float:
     dots = placed.to_space((begin[:, None] + share[None, :, None] * (end - begin)[:, None]).reshape(-1, 3))
     length = np.repeat(np.linalg.norm(end - begin, axis=1) / DOTS, DOTS)
     visible = (dots[:, 2] > MIN_HEIGHT + UNSEEN_MARGIN) & (dots[:, 2] < MAX_HEIGHT - UNSEEN_MARGIN)
-    away, _ = shown.query(dots[visible], distance_upper_bound=UNSEEN_REACH)
+    away, _ = shown.query(dots[visible], distance_upper_bound=placed.ladder.diameter / 2.0 + UNSEEN_REACH)
     return float(length[visible][~np.isfinite(away)].sum()) / UNSEEN_LENGTH
 
 
