@@ -1,8 +1,8 @@
 """Cylinders of any radius from strips of planes.
 
-Noise hides the curvature of a wide vessel over a few voxels, so that growing divides it into plane strips, each as wide as its sag
-stays within the noise. Two adjacent strips show the curvature: a cylinder through both fits better than the two planes do. A crease
-between flat plates has the opposite effect.
+Noise hides the curvature of a wide vessel over a few voxels. Growing therefore divides it into plane strips, as wide as their sag
+stays within the noise. Two adjacent strips show the curvature: a cylinder through both fits better than the two planes do. A
+crease between flat plates has the opposite effect.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from tunneldb.structures.models import AXIS, POINT, RADIUS, SIDE, WIDTH
 from tunneldb.structures.voxel_grid import VoxelGrid
 
 MIN_TURN, MAX_TURN = 1.0, 30.0
-"""Angle between the normals of adjacent strips, degrees: registration errors are smaller, strips of pipes found otherwise wider."""
+"""Limits of the angle between the normals of adjacent strips, degrees: registration errors are smaller."""
 
 MIN_EXCESS = 1.3
 """Minimum ratio of the scatter of centroids about a strip's plane to that about the cylinder."""
@@ -96,9 +96,7 @@ class _Strips:
         fits = all(self.own[k] > MIN_EXCESS * self.scatter(model, self.held(k)) for k in pair)
         return model if fits and np.isfinite(model).all() else None
 
-    def extended(
-        self, held: list[int], model: Float, beside: dict[int, set[int]], into: Int64
-    ) -> tuple[list[int], Float]:
+    def extended(self, held: list[int], model: Float, beside: dict[int, set[int]], into: Int64) -> tuple[list[int], Float]:
         """Add faces that touch and fit a cylinder; return all its faces, and the cylinder fitted to them."""
         while True:
             near = set().union(*(beside.get(k, set()) for k in held)) - set(held)

@@ -41,8 +41,8 @@ PARTLY = 1.0 / 3.0
 """… or this share, if most of one whole side differs from most of the other by that much: rust may hide the step."""
 
 MAX_EDGE_SCATTER = 0.5
-"""Maximum mean deviation of the step from its line, pixels: a built edge can lie anywhere in a pixel. The edge of damp that rises
-over the whole width of a wall wanders by many."""
+"""Maximum mean deviation of the step from its line, pixels: a built edge can lie anywhere in a pixel. The edge of damp
+that rises over the whole width of a wall varies by many."""
 
 ALONG, ACROSS = 8, 3
 """Pixels of a block along the line and across it."""

@@ -237,6 +237,7 @@ class MembersOf:
         self.starts = np.searchsorted(owner[self.order], np.arange(count + 1))
 
     def __call__(self, face: int) -> Int64:
+        """Return the voxels of a face."""
         return self.order[self.starts[face] : self.starts[face + 1]]
 
 
