@@ -1,6 +1,6 @@
 """Cylinders of any radius from strips of planes.
 
-Noise hides the curvature of a wide vessel over a few voxels. Growing therefore divides it into plane strips, as wide as their sag
+Noise hides the curvature of a wide vessel over a few voxels. Growing therefore divides it into plane strips, as wide as the sag
 stays within the noise. Two adjacent strips show the curvature: a cylinder through both fits better than the two planes do. A
 crease between flat plates has the opposite effect.
 """

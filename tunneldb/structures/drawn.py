@@ -1,7 +1,7 @@
 """Drawn regions: labels, plates and painted bands are part of the design of a surface.
 
 Their outline is a triangle or quadrilateral with straight edges, and they are as even as the surface. Rust and damp end on
-straight edges only where the face itself ends. A drawn region therefore lies within its face, or goes around a pipe, or is one of
+straight edges only where the face itself ends. So a drawn region lies within its face, or goes around a pipe, or is one of
 several of the same width and contrast.
 """
 
