@@ -21,7 +21,7 @@ from tunneldb.structures.results import Face, Member, MemberKind, Spot, Structur
 from tunneldb.structures.segmentation import Segmentation
 from tunneldb.structures.significance import Scatter
 from tunneldb.structures.solidity import closed, ray_densities, solid_faces
-from tunneldb.structures.spots import BIMODAL, FaceSpots, find_spots
+from tunneldb.structures.spots import BIMODAL, FaceSpots, find_spots, without_design
 
 MIN_FACE_AREA = 0.002
 """Minimum area of a face, m²."""
@@ -271,6 +271,7 @@ def _judge(
             curves = [own.get(one.scan, levels.get(one.scan, UNKNOWN)) for one in seen]
             contrast = contrast_of(layout, part.face, seen, curves, found.noise)
             out.append((contrast, find_spots(contrast, pixels, scatter)))
+        out = without_design(out, pipe=bool(layout.models[parts[0].face][RADIUS] > 0.0))
         if turn == TURNS - 1 or not any(spots.spots for _, spots in out):
             break
         scatter.restore(before)

@@ -40,6 +40,10 @@ EVEN = 0.85
 PARTLY = 1.0 / 3.0
 """… or this share, if most of one whole side differs from most of the other by that much: rust may hide the step."""
 
+MAX_EDGE_SCATTER = 0.5
+"""Maximum mean deviation of the step from its line, pixels: a built edge can lie anywhere in a pixel. The edge of damp
+that rises over the whole width of a wall varies by many."""
+
 ALONG, ACROSS = 8, 3
 """Pixels of a block along the line and across it."""
 
@@ -163,7 +167,7 @@ def part_by_material(images: list[Float], pixel: float) -> Int32:
 
 def _best_line(images: list[Float], pixel: float) -> tuple[int, int] | None:
     """Return axis and place of the most significant level step, as all scans see it; None if there is no step."""
-    best: tuple[float, int, int, Bool] | None = None
+    possible: list[tuple[float, int, int, Bool]] = []
     for axis in (0, 1):
         turned = [np.moveaxis(image, axis, 0) for image in images]
         place = np.flatnonzero(np.any([np.isfinite(lines).any(axis=1) for lines in turned], axis=0))
@@ -193,14 +197,15 @@ def _best_line(images: list[Float], pixel: float) -> tuple[int, int] | None:
             for step, share in ((local, EVEN), (_apart(blocks, k), PARTLY)):
                 there = np.abs(steps - step) < 0.5 * abs(step)
                 sure = abs(step) / sigma * float(np.sqrt(there.sum()))
-                if abs(step) >= least and there.sum() >= share * seen and (best is None or sure > best[0]):
-                    best = (sure, axis, first + ACROSS * k, there)
-    if best is None:
+                if abs(step) >= least and there.sum() >= share * seen:
+                    possible.append((sure, axis, first + ACROSS * k, there))
+    if not possible:
         return None
-    _, axis, about, there = best
+    _, axis, about, there = max(possible, key=lambda line: line[0])
     turned = [np.moveaxis(image, axis, 0) for image in images]
     clear = np.repeat(there, ALONG, axis=1)[:, : turned[0].shape[1]]
-    return axis, _sharpest([np.where(here, lines, np.nan) for here, lines in zip(clear, turned, strict=True)], about)
+    at, scatter = _sharpest([np.where(here, lines, np.nan) for here, lines in zip(clear, turned, strict=True)], about)
+    return (axis, at) if scatter <= MAX_EDGE_SCATTER else None
 
 
 def _apart(blocks: Sequence[Float], k: int) -> float:
@@ -245,21 +250,34 @@ def _nan_median(values: Float) -> Float:
     return np.asarray(0.5 * (both[0] + both[1]))
 
 
-def _sharpest(images: list[Float], about: int) -> int:
-    """Return the first line behind a step near a place: most pixels before it are below its middle, most behind above.
+def _sharpest(images: list[Float], about: int) -> tuple[int, float]:
+    """Return the first line behind a step near a place, and the scatter of the step about it, pixels.
 
-    All scans vote: where something hides the step from one, another sees it. NaN is where none is seen.
+    Most pixels before the line are below the middle of the step, most behind it above. All scans vote: where something hides
+    the step from one, another sees it. NaN is where none is seen. The scatter is that of the lines found so block by block.
     """
     reach = (BLOCKS + 1) * ACROSS
     first = max(about - 2 * reach, 0)
-    votes = np.zeros(len(images[0][first : about + 2 * reach]))
+    size, width = images[0][first : about + 2 * reach].shape
+    votes = np.zeros((size, -(-width // ALONG)))
+    starts = np.arange(0, width, ALONG)
     for image in images:
         near = image[first : about + 2 * reach]
         known = np.isfinite(near)
         before, after = near[: about - first][known[: about - first]], near[about - first :][known[about - first :]]
         if len(before) and len(after):
             low, high = float(np.median(before)), float(np.median(after))
-            votes += np.where(known, np.sign((near - 0.5 * (low + high)) * (high - low)), 0.0).sum(axis=1)
-    score = votes.sum() - 2.0 * np.concatenate([[0.0], np.cumsum(votes)])
+            sides = np.where(known, np.sign((near - 0.5 * (low + high)) * (high - low)), 0.0)
+            votes += np.add.reduceat(sides, starts, axis=1)
     inner = slice(max(about - reach - first, 1), about + reach - first)
-    return first + inner.start + int(np.argmax(score[inner]))
+    at = _step_of(votes.sum(axis=1, keepdims=True), inner)[0]
+    seen = (votes != 0.0).sum(axis=0) >= 2 * ACROSS
+    off = np.abs(_step_of(votes[:, seen], inner) - at)
+    nearer = np.sort(off)[: max(3 * len(off) // 4, 1)]  # rust along the line hides the rest
+    return first + int(at), float(nearer.mean()) if len(off) else np.inf
+
+
+def _step_of(votes: Float, inner: slice) -> Int64:
+    """Return the first line behind the step in each column of votes (lines, n)."""
+    score = votes.sum(axis=0) - 2.0 * np.vstack([np.zeros(votes.shape[1]), np.cumsum(votes, axis=0)])
+    return np.asarray(inner.start + np.argmax(score[inner], axis=0))

@@ -68,7 +68,7 @@ def merge(grid: VoxelGrid, starts: Int64, neighbours: Int32, towards: Float, gro
     owner, models = grown.owner.copy(), grown.models.copy()
     count = len(models)
     centroid = grid.centroids
-    within = _touching(owner, starts, neighbours)
+    within = touching(owner, starts, neighbours)
     across = _at_one_place(grid.keys, owner)
     tolerance = np.concatenate(
         [np.full(len(within), max(STEP, 3.0 * noise)), np.full(len(across), max(MAX_DISTANCE_IN_SCAN, 3.0 * noise))]
@@ -76,7 +76,7 @@ def merge(grid: VoxelGrid, starts: Int64, neighbours: Int32, towards: Float, gro
     pairs = np.concatenate([within, across])
     merged_into = np.arange(count)
     for _ in range(ROUNDS):
-        sums, held = _sums(grid, owner, count), _Members(owner, count)
+        sums, held = sums_of(grid, owner, count), MembersOf(owner, count)
         ends = merged_into[pairs]
         differ = ends[:, 0] != ends[:, 1]
         ends, limit = ends[differ], tolerance[differ]
@@ -96,8 +96,8 @@ def merge(grid: VoxelGrid, starts: Int64, neighbours: Int32, towards: Float, gro
             break
         merged_into = into[merged_into]
         owner = np.where(owner >= 0, into[np.maximum(owner, 0)], -1).astype(np.int32)
-        held = _Members(owner, count)
-        sums = _sums(grid, owner, count)
+        held = MembersOf(owner, count)
+        sums = sums_of(grid, owner, count)
         for a in np.unique(into[changed]).tolist():
             refit(grid, centroid, sums[a], held(a), noise, models[a])
     return _ordered(grid, centroid, towards, owner, models, noise)
@@ -106,7 +106,7 @@ def merge(grid: VoxelGrid, starts: Int64, neighbours: Int32, towards: Float, gro
 def _ordered(grid: VoxelGrid, centroid: Float, towards: Float, owner: Int32, models: Float, noise: float) -> Faces:
     """Return faces in order of size, oriented to the scanner; those with too much scatter are left out."""
     count = len(models)
-    sums, held = _sums(grid, owner, count), _Members(owner, count)
+    sums, held = sums_of(grid, owner, count), MembersOf(owner, count)
     rms, good = np.zeros(count), np.zeros(count, np.bool_)
     for k in range(count):
         voxels = held(k)
@@ -158,7 +158,7 @@ def refine(fine: VoxelGrid, face: Int32, faces: Faces, noise: float) -> None:
         Standard deviation of ranges, m.
     """
     centroid = fine.centroids
-    held = _Members(face, len(faces.models))
+    held = MembersOf(face, len(faces.models))
     for k in np.flatnonzero(faces.models[:, RADIUS] > 0.0).tolist():
         voxels = held(k)
         if len(voxels):
@@ -195,7 +195,7 @@ def _fits(one: Float, other: Float, grid: VoxelGrid, centroid: Float, sums: Floa
     return bool(np.sqrt(np.mean(distances(one, centroid[voxels]) ** 2)) < limit)
 
 
-def _touching(owner: Int32, starts: Int64, neighbours: Int32) -> Int64:
+def touching(owner: Int32, starts: Int64, neighbours: Int32) -> Int64:
     """Return pairs of faces (m, 2) whose voxels touch, or touch one voxel between them."""
     most, number = max(int(owner.max(initial=-1)) + 1, 1), 0
     pairs = np.empty(0, np.int64)
@@ -222,14 +222,14 @@ def _at_one_place(keys: Int64, owner: Int32) -> Int64:
     return np.unique(np.concatenate(found), axis=0)
 
 
-def _sums(grid: VoxelGrid, owner: Int32, count: int) -> Float:
+def sums_of(grid: VoxelGrid, owner: Int32, count: int) -> Float:
     """Return the moments (count, 10) of faces."""
     out = np.zeros((count, grid.moments.shape[1]))
     _add_moments(owner, grid.moments, out)
     return out
 
 
-class _Members:
+class MembersOf:
     """Voxels of each face, looked up by its number."""
 
     def __init__(self, owner: Int32, count: int) -> None:
@@ -237,6 +237,7 @@ class _Members:
         self.starts = np.searchsorted(owner[self.order], np.arange(count + 1))
 
     def __call__(self, face: int) -> Int64:
+        """Return the voxels of a face."""
         return self.order[self.starts[face] : self.starts[face + 1]]
 
 

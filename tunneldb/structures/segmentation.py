@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tunneldb.arrays import Float
+from tunneldb.structures.curving import curve
 from tunneldb.structures.face_raster import Layout, PointFinder, candidates_of, lay_out
 from tunneldb.structures.growing import UNKNOWN_NOISE, grow, noise_of
 from tunneldb.structures.merging import Faces, merge, refine
@@ -69,6 +70,9 @@ def find_faces(moments: VoxelMoments, stations: Float) -> Segmentation:
     planes = voxel_planes(grid, starts, neighbours, at, noise)
     grown = grow(grid, starts, neighbours, planes, towards, noise)
     faces = merge(grid, starts, neighbours, towards, grown, noise)
+    curved = curve(grid, starts, neighbours, faces, noise)
+    if curved is not None:
+        faces = merge(grid, starts, neighbours, towards, curved, noise)
     faces = with_thin_pipes(moments, level, grid, faces, at, noise)
     round_ = np.append(faces.models[:, RADIUS] > 0.0, False)[faces.owner]
     if round_.any():

@@ -18,6 +18,7 @@ from tunneldb.arrays import Bool, Int32, Single
 from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.state import PixelState
 from tunneldb.structures.contrast import FaceContrast
+from tunneldb.structures.drawn import drawn, patch_of
 from tunneldb.structures.face_raster import STEP
 from tunneldb.structures.significance import Scatter, significance
 
@@ -69,12 +70,15 @@ class FaceSpots:
         Share of the pixels judged that are in spots.
     seen : int
         Pixels that are known to differ or not: with contrast, or with enough contrast around them.
+    size : int
+        Size of the median filter, pixels.
     """
 
     spots: list[FoundSpot]
     numbers: Int32
     share: float
     seen: int
+    size: int = 1
 
 
 def find_spots(face: FaceContrast, pixels: int, scatter: Scatter) -> FaceSpots:
@@ -111,15 +115,36 @@ def find_spots(face: FaceContrast, pixels: int, scatter: Scatter) -> FaceSpots:
         marked = refine_boundary(marked, image, size)
         for region in find_regions(marked, marked, image, MIN_SPOT_AREA, None):
             spot = _judge(region, kind, face, sign * limit_ratio[::-1], rim)
-            if spot is None:
-                continue
-            found.append(spot)
-            part = numbers[_box(spot)]
-            part[spot.mask & (part == 0)] = len(found)
+            if spot is not None:
+                found.append(spot)
+    return numbered(face, found, size)
+
+
+def numbered(face: FaceContrast, found: list[FoundSpot], size: int) -> FaceSpots:
+    """Write the numbers of the spots of a face into its pixels."""
+    numbers = np.zeros(face.face.shape, np.int32)
+    for number, spot in enumerate(found, start=1):
+        part = numbers[_box(spot)]
+        part[spot.mask & (part == 0)] = number
     _over_rim(face, numbers, found)
-    share = float((numbers[face.judged] > 0).sum()) / judged
+    share = float((numbers[face.judged] > 0).mean())
     seen = sum(int(np.count_nonzero(part)) for _, part in seen_lining(face.image.state, size))
-    return FaceSpots(found, numbers, share, seen)
+    return FaceSpots(found, numbers, share, seen, size)
+
+
+def without_design(faces: list[tuple[FaceContrast, FaceSpots]], *, pipe: bool) -> list[tuple[FaceContrast, FaceSpots]]:
+    """Leave out the drawn regions of the faces of a surface, and stray points."""
+    patches = []
+    for face, spots in faces:
+        drop = np.where(face.judged, face.image.drop[::-1], np.int16(0)) * np.float32(STEP)
+        pixel = face.image.grid.pixel
+        patches += [patch_of(spot.mask, spot.corner, pixel, drop, face.judged, face.sigma, pipe=pipe) for spot in spots.spots]
+    kept = iter([not design and not patch.stray for patch, design in zip(patches, drawn(patches), strict=True)])
+    out = []
+    for face, spots in faces:
+        rest = [spot for spot in spots.spots if next(kept)]
+        out.append((face, spots if len(rest) == len(spots.spots) else numbered(face, rest, spots.size)))
+    return out
 
 
 def _judge(
