@@ -35,8 +35,13 @@ class Raster:
         return a[:, None], b[None, :]
 
 
-def relief(rng: np.random.Generator, a: tuple[float, float], b: tuple[float, float], step: tuple[float, float],
-           parts: list[tuple[float, float, float]]) -> Raster:
+def relief(
+    rng: np.random.Generator,
+    a: tuple[float, float],
+    b: tuple[float, float],
+    step: tuple[float, float],
+    parts: list[tuple[float, float, float]],
+) -> Raster:
     """A raster of noise: each part is (sigma, correlation length along a, along b), in m; length 0 is white."""
     shape = (int((a[1] - a[0]) / step[0]) + 2, int((b[1] - b[0]) / step[1]) + 2)
     total = np.zeros(shape)
@@ -62,8 +67,9 @@ class Axis:
         end = self.length / self.radius
         c, k = np.cos(end), np.sin(end)
         ex, ey = dx - self.radius * k, y - self.radius * (1 - c)
-        s = np.where(theta < 0, x, np.where(theta > end, self.start + self.length + ex * c + ey * k,
-                                            self.start + self.radius * theta))
+        s = np.where(
+            theta < 0, x, np.where(theta > end, self.start + self.length + ex * c + ey * k, self.start + self.radius * theta)
+        )
         n = np.where(theta < 0, y, np.where(theta > end, -ex * k + ey * c, self.radius - np.hypot(dx, dy)))
         return s, n
 
@@ -87,9 +93,9 @@ class Axis:
 class Wall:
     """One side: distance from the axis at the water, in plan, and its profile below and above the water."""
 
-    plan: tuple[Array, Array]                       # s and distance from the axis at the water
-    profile: tuple[Array, Array]                    # height above the water and how much further out the wall is
-    rough: Raster                                   # over s and z; positive is further out
+    plan: tuple[Array, Array]  # s and distance from the axis at the water
+    profile: tuple[Array, Array]  # height above the water and how much further out the wall is
+    rough: Raster  # over s and z; positive is further out
 
     def out(self, s: Array, z: Array, water: float) -> Array:
         return np.interp(s, *self.plan) + np.interp(z - water, *self.profile) + self.rough(s, z)
@@ -99,10 +105,10 @@ class Wall:
 class Towpath:
     """A masonry path on the right bank, on piers with segmental arches between them, open to the water behind."""
 
-    front: float                                    # distance of the front face from the axis
+    front: float  # distance of the front face from the axis
     top: float
-    centres: Array                                  # of the openings
-    half: Array                                     # half spans of the openings
+    centres: Array  # of the openings
+    half: Array  # half spans of the openings
     crown: float
     rise: float
     rough: Raster
@@ -122,8 +128,8 @@ class Boat:
     """An open hull: the shell of an ellipsoid, cut at the gunwale, with thwarts; turned and heeled."""
 
     place: Array
-    turn: Array                                     # rotation from the boat's axes to the local frame
-    size: tuple[float, float, float]                # half length, half breadth, depth
+    turn: Array  # rotation from the boat's axes to the local frame
+    size: tuple[float, float, float]  # half length, half breadth, depth
     shell: float = 0.03
     solid_fill: bool = False
 
@@ -191,11 +197,11 @@ class Ladder:
     up: Array
     side: Array
     length: float
-    heights: Array                                  # of the rungs, along the ladder
+    heights: Array  # of the rungs, along the ladder
     gap: float
-    rung: float                                     # diameters
+    rung: float  # diameters
     stile: float
-    sag: Array                                      # how far the middle of each rung is bent down
+    sag: Array  # how far the middle of each rung is bent down
     steel: bool = True
 
     def bars(self) -> Bars:
@@ -214,9 +220,21 @@ class Ladder:
         return Bars(np.array(a), np.array(b), np.array(r))
 
 
-def make_ladder(axis: Axis, s: float, n: float, z_foot: float, length: float, lean: float, slant: float, spacing: float,
-                sigma: float, rng: np.random.Generator, missing: int | None = None, bent: int | None = None,
-                **kind: float | bool) -> Ladder:
+def make_ladder(
+    axis: Axis,
+    s: float,
+    n: float,
+    z_foot: float,
+    length: float,
+    lean: float,
+    slant: float,
+    spacing: float,
+    sigma: float,
+    rng: np.random.Generator,
+    missing: int | None = None,
+    bent: int | None = None,
+    **kind: float | bool,
+) -> Ladder:
     """A ladder at a wall of either side; it leans towards the wall by ``lean`` and along it by ``slant`` degrees."""
     x, y = axis.to_local(s, n)
     h = axis.heading(s)
@@ -246,17 +264,17 @@ class Canal:
     left: Wall
     right: Wall
     bed: Raster
-    spring: float                                   # height of the springing above the water
+    spring: float  # height of the springing above the water
     rise: float
     vault_rough: Raster
-    top: float = 6.0                                # outside the portals: height of the walls above the water
+    top: float = 6.0  # outside the portals: height of the walls above the water
     towpath: Towpath | None = None
     sunk: list[Boat] = field(default_factory=list)
-    afloat: list[Boat] = field(default_factory=list)    # only at the time of the laser scan
+    afloat: list[Boat] = field(default_factory=list)  # only at the time of the laser scan
     ladders: list[Ladder] = field(default_factory=list)
-    ropes: list[Bars] = field(default_factory=list)     # only at the time of the laser scan
-    caution: float = 0.85                           # share of the distance that is marched
-    shine: float = 1.0                              # exponent of the cosine of incidence in a sonar echo
+    ropes: list[Bars] = field(default_factory=list)  # only at the time of the laser scan
+    caution: float = 0.85  # share of the distance that is marched
+    shine: float = 1.0  # exponent of the cosine of incidence in a sonar echo
 
     def sdf(self, laser: bool = False) -> Callable[[Array], Array]:
         """The distance to the nearest surface, as a function of points; negative inside of matter.
@@ -296,8 +314,16 @@ class Canal:
         return distance
 
 
-def march(distance: Callable[[Array], Array], origin: Array, d: Array, t0: Array | float, t_max: Array | float,
-          cone: float = 0.0, eps: float = 2e-4, steps: int = 160) -> Array:
+def march(
+    distance: Callable[[Array], Array],
+    origin: Array,
+    d: Array,
+    t0: Array | float,
+    t_max: Array | float,
+    cone: float = 0.0,
+    eps: float = 2e-4,
+    steps: int = 160,
+) -> Array:
     """Sphere tracing. The distance along each ray; inf where nothing is met before ``t_max``.
 
     With ``cone``, the tangent of half an angle, a ray stops where the surface comes near the cone.

@@ -23,7 +23,7 @@ class Frame:
     epsg: int
     x: float
     y: float
-    azimuth: float                                  # of the local x axis, counterclockwise from east, degrees
+    azimuth: float  # of the local x axis, counterclockwise from east, degrees
 
     @property
     def turn(self) -> Array:
@@ -49,8 +49,14 @@ def rays(azimuth: Array, elevation: Array) -> Array:
 # ---------------------------------------------------------------------------------------------------------------- laser
 
 
-def laser_scan(canal: Canal, at: Array, step: float, rng: np.random.Generator, reach: float = 60.0,
-               window: tuple[float, float, float, float] | None = None) -> tuple[Array, Array]:
+def laser_scan(
+    canal: Canal,
+    at: Array,
+    step: float,
+    rng: np.random.Generator,
+    reach: float = 60.0,
+    window: tuple[float, float, float, float] | None = None,
+) -> tuple[Array, Array]:
     """Points and intensities from one station. ``window`` (degrees: azimuths, elevations) is a finer scan of a part."""
     az0, az1, el0, el1 = window or (0.0, 360.0, -62.0, 89.0)
     block = 4
@@ -104,7 +110,7 @@ def laser_scan(canal: Canal, at: Array, step: float, rng: np.random.Generator, r
     ok = np.isfinite(t)
     p = at + d[ok] * t[ok, None]
     s, _ = canal.axis.to_canal(p[:, 0], p[:, 1])
-    keep = (p[:, 2] < canal.water + canal.top) | ((s > 0) & (s < canal.length))     # above the walls outside is sky
+    keep = (p[:, 2] < canal.water + canal.top) | ((s > 0) & (s < canal.length))  # above the walls outside is sky
     keep &= rng.random(len(p)) > 0.005
     t, p = t[ok][keep], p[keep]
     t_noise = rng.normal(0, 0.002, len(t)) * np.sqrt(1 + (t / 25) ** 2)
@@ -133,18 +139,18 @@ class Sonar:
 
     s: float
     n: float
-    depth: float                                    # of the head below the water of the laser scan
+    depth: float  # of the head below the water of the laser scan
     heading: float
     tilt: float
     tilt_to: float
     scale: float
-    fell: float = 0.0                               # how far the water fell since the laser scan
+    fell: float = 0.0  # how far the water fell since the laser scan
     determined: bool = True
     open: str = ""
-    beams: tuple[float, float, float] = (-80.0, 64.0, 0.72)     # elevations: first, last, step
-    turn_step: float = 1.25                         # of the rotation
-    width: float = 1.0                              # of the beam, half power
-    sigma: float = 0.014                            # of a range, m
+    beams: tuple[float, float, float] = (-80.0, 64.0, 0.72)  # elevations: first, last, step
+    turn_step: float = 1.25  # of the rotation
+    width: float = 1.0  # of the beam, half power
+    sigma: float = 0.014  # of a range, m
     reach: float = 30.0
 
 
@@ -182,7 +188,7 @@ def sonar_scan(canal: Canal, sonar: Sonar, up: str, rng: np.random.Generator) ->
     begin = np.minimum(march(distance, at, main, 0.1, sonar.reach + 3, cone), sonar.reach + 3)
 
     # Parts of the footprint: the middle, a ring of three and a ring of four, turned at random from beam to beam.
-    radius = np.radians(sonar.width) * np.array([0, .27, .27, .27, .55, .55, .55, .55])
+    radius = np.radians(sonar.width) * np.array([0, 0.27, 0.27, 0.27, 0.55, 0.55, 0.55, 0.55])
     share = np.exp2(-((radius / np.radians(sonar.width / 2)) ** 2)) * np.array([1, 1, 1, 1, 1.2, 1.2, 1.2, 1.2])
     phase = np.array([0, 0, 120, 240, 0, 90, 180, 270]) * np.pi / 180
     side = np.cross(main, [0.0, 0.0, 1.0])
@@ -194,8 +200,9 @@ def sonar_scan(canal: Canal, sonar: Sonar, up: str, rng: np.random.Generator) ->
     d /= np.linalg.norm(d, axis=2, keepdims=True)
     parts = len(radius)
     d = d.reshape(-1, 3)
-    t, energy, label = _first(canal, distance, at, d, np.repeat(begin, parts) * 0.99 - 0.02, sonar.reach + 2, surface_z,
-                              tripod, ladders, steel)
+    t, energy, label = _first(
+        canal, distance, at, d, np.repeat(begin, parts) * 0.99 - 0.02, sonar.reach + 2, surface_z, tripod, ladders, steel
+    )
     t, label = t.reshape(count, parts), label.reshape(count, parts)
     energy = energy.reshape(count, parts) * share
     energy[~np.isfinite(t)] = 0
@@ -205,7 +212,7 @@ def sonar_scan(canal: Canal, sonar: Sonar, up: str, rng: np.random.Generator) ->
     best, chosen = np.zeros(count), np.full(count, np.inf)
     kind = np.zeros(count, int)
     for i in range(parts):
-        near = np.abs(safe - safe[:, i:i + 1]) < 0.03
+        near = np.abs(safe - safe[:, i : i + 1]) < 0.03
         power = (energy * near).sum(1)
         better = power > best * 1.0001
         mean = (energy * near * safe).sum(1) / np.maximum(power, 1e-12)
@@ -244,19 +251,38 @@ def sonar_scan(canal: Canal, sonar: Sonar, up: str, rng: np.random.Generator) ->
     # Check points: hits of single rays, evenly spread over all directions, on walls, piers, bed, boat and ladders.
     probe = rng.normal(size=(6000, 3))
     probe /= np.linalg.norm(probe, axis=1, keepdims=True)
-    t, _, label = _first(canal, distance, at, probe, np.full(len(probe), 0.05), 10.0, surface_z, tripod, ladders, steel,
-                         eps=1e-4)
+    t, _, label = _first(
+        canal, distance, at, probe, np.full(len(probe), 0.05), 10.0, surface_z, tripod, ladders, steel, eps=1e-4
+    )
     good = ((label == SHELL) | (label == LADDER)) & (t < 9.9)
     good &= np.abs(distance(at + np.where(good, t, 0)[:, None] * probe)) < np.where(label == LADDER, np.inf, 1e-3)
     good = np.flatnonzero(good)[:500]
     world = at + t[good, None] * probe[good]
-    truth = {"turn": turn, "at": at, "scale": sonar.scale, "check": world,
-             "check_local": (world - at) @ turn / sonar.scale, "determined": sonar.determined, "open": sonar.open}
+    truth = {
+        "turn": turn,
+        "at": at,
+        "scale": sonar.scale,
+        "check": world,
+        "check_local": (world - at) @ turn / sonar.scale,
+        "determined": sonar.determined,
+        "open": sonar.open,
+    }
     return points, truth
 
 
-def _first(canal: Canal, distance: object, at: Array, d: Array, begin: Array, reach: float, surface_z: float, tripod: Bars,
-           ladders: list[Bars], steel: list[bool], eps: float = 8e-4) -> tuple[Array, Array, Array]:
+def _first(
+    canal: Canal,
+    distance: object,
+    at: Array,
+    d: Array,
+    begin: Array,
+    reach: float,
+    surface_z: float,
+    tripod: Bars,
+    ladders: list[Bars],
+    steel: list[bool],
+    eps: float = 8e-4,
+) -> tuple[Array, Array, Array]:
     """Range, strength and kind of what each ray meets first below the water."""
     with np.errstate(divide="ignore"):
         top = np.where(d[:, 2] > 0, (surface_z - at[2]) / d[:, 2], np.inf)
@@ -295,9 +321,19 @@ class Station:
     fine: tuple[int, ...] = ()
 
 
-def write(folder: Path, canal: Canal, frame: Frame, stations: list[Station], sonars: list[Sonar], up: str, seed: int,
-          step: float = 0.24, start: list[int] | None = None, within: float = 1.5,
-          sound: tuple[float, float] | None = None) -> None:
+def write(
+    folder: Path,
+    canal: Canal,
+    frame: Frame,
+    stations: list[Station],
+    sonars: list[Sonar],
+    up: str,
+    seed: int,
+    step: float = 0.24,
+    start: list[int] | None = None,
+    within: float = 1.5,
+    sound: tuple[float, float] | None = None,
+) -> None:
     """All files of a scene."""
     rng = np.random.default_rng(seed)
     points, strengths, source, rows = [], [], [], []
@@ -316,23 +352,35 @@ def write(folder: Path, canal: Canal, frame: Frame, stations: list[Station], son
     s = np.append(np.arange(0, canal.length - 1, 2.0), canal.length)
     x, y = canal.axis.to_local(s, np.zeros_like(s))
     _csv(folder / "axis.csv", ["x", "y", "z"], np.round(frame(np.stack([x, y, np.full_like(x, canal.water)], 1)), 4).tolist())
-    _csv(folder / "ladders.csv", ["ladder", "rung", "height", "stile_gap", "diameter"],
-         [[k, j, round(float(h - ladder.heights[0] + 0.2 + rng.normal(0, 0.0015)), 3), round(ladder.gap, 3), ladder.rung]
-          for k, ladder in enumerate(canal.ladders, 1) for j, h in enumerate(ladder.heights, 1)])
+    _csv(
+        folder / "ladders.csv",
+        ["ladder", "rung", "height", "stile_gap", "diameter"],
+        [
+            [k, j, round(float(h - ladder.heights[0] + 0.2 + rng.normal(0, 0.0015)), 3), round(ladder.gap, 3), ladder.rung]
+            for k, ladder in enumerate(canal.ladders, 1)
+            for j, h in enumerate(ladder.heights, 1)
+        ],
+    )
     scans, starts = [], []
     for i, sonar in enumerate(sonars, 1):
         p, truth = sonar_scan(canal, sonar, up, rng)
         np.savetxt(folder / f"sonar_{i}.xyz", p, fmt="%.4f")
-        entry = {"rotation": (frame.turn @ truth["turn"]).tolist(), "origin": frame(truth["at"]).tolist(),
-                 "scale": truth["scale"], "check_local": truth["check_local"].tolist(),
-                 "check_world": frame(truth["check"]).tolist(), "determined": truth["determined"]}
+        entry = {
+            "rotation": (frame.turn @ truth["turn"]).tolist(),
+            "origin": frame(truth["at"]).tolist(),
+            "scale": truth["scale"],
+            "check_local": truth["check_local"].tolist(),
+            "check_world": frame(truth["check"]).tolist(),
+            "determined": truth["determined"],
+        }
         if truth["open"]:
             entry["open"] = truth["open"]
         scans.append(entry)
         if start and i in start:
             paced = frame(truth["at"])[:2] + rng.uniform(-0.6, 0.6, 2) * within
-            starts.append({"file": f"sonar_{i}.xyz", "x": round(float(paced[0]), 1), "y": round(float(paced[1]), 1),
-                           "within": within})
+            starts.append(
+                {"file": f"sonar_{i}.xyz", "x": round(float(paced[0]), 1), "y": round(float(paced[1]), 1), "within": within}
+            )
     scene: dict = {"epsg": frame.epsg, "up": up, "water_level": canal.water}
     if sound:
         scene["sound_speed"] = list(sound)

@@ -14,12 +14,25 @@ from benchmarks.blind_canal.scene import Scene
 from . import canals
 
 SCENES: tuple[Scene, ...] = (
-    Scene("masonry-towpath", "35 m of ashlar, towpath on the left, recesses, pilasters, three wooden ladders, three multibeam "
-          "scans, a moored boat with ropes", canals.masonry),
-    Scene("brick-s-bends", "2,000 m of brick in S bends, a ladder every 40 m, twelve multibeam scans 8 m apart, paced places",
-          canals.long_bends),
-    Scene("profiler-ledge", "20 m, ledges below the water, two leaning ladders, two scans of a profiling sonar, z down",
-          canals.profiler),
-    Scene("bridge-piers", "50 m, one ladder near an end, piers of a footbridge, scour holes, four multibeam scans, measured "
-          "speed of sound", canals.piers),
+    Scene(
+        "masonry-towpath",
+        "35 m of ashlar, towpath on the left, recesses, pilasters, three wooden ladders, three multibeam "
+        "scans, a moored boat with ropes",
+        canals.masonry,
+    ),
+    Scene(
+        "brick-s-bends",
+        "2,000 m of brick in S bends, a ladder every 40 m, twelve multibeam scans 8 m apart, paced places",
+        canals.long_bends,
+    ),
+    Scene(
+        "profiler-ledge",
+        "20 m, ledges below the water, two leaning ladders, two scans of a profiling sonar, z down",
+        canals.profiler,
+    ),
+    Scene(
+        "bridge-piers",
+        "50 m, one ladder near an end, piers of a footbridge, scour holes, four multibeam scans, measured speed of sound",
+        canals.piers,
+    ),
 )

@@ -39,11 +39,11 @@ class Plan:
     epsg: int
     east: float
     north: float
-    level: float               # height of the water at the laser's time
-    azimuth: float             # degrees, of the local x axis, counted from east to north
+    level: float  # height of the water at the laser's time
+    azimuth: float  # degrees, of the local x axis, counted from east to north
     scale: float
     seed: int
-    water_then: float = 0.0    # water of the sonar's day above that of the laser's
+    water_then: float = 0.0  # water of the sonar's day above that of the laser's
     down: bool = False
     sound: tuple[float, float] | None = None
     paced: float | None = None
@@ -115,17 +115,28 @@ def write(plan: Plan, folder: Path) -> None:
         got = ins.sonar(canal, head, plan.water_then, plan.scale, plan.down, ladders + plan.ropes_sonar, plan.hulls_sonar)
         np.savetxt(folder / f"sonar_{i}.xyz", got["points"], fmt="%.4f")
         rot, origin = turn @ got["rotation"], turn @ got["origin"] + base
-        entry = {"rotation": rot.tolist(), "origin": origin.tolist(), "scale": plan.scale,
-                 "check_local": got["check"].tolist(),
-                 "check_world": (plan.scale * got["check"] @ rot.T + origin).tolist(), "determined": head.determined}
+        entry = {
+            "rotation": rot.tolist(),
+            "origin": origin.tolist(),
+            "scale": plan.scale,
+            "check_local": got["check"].tolist(),
+            "check_world": (plan.scale * got["check"] @ rot.T + origin).tolist(),
+            "determined": head.determined,
+        }
         if not head.determined:
             entry["open"] = head.open
         scans.append(entry)
         if plan.paced is not None:
             off = rng.uniform(-1, 1, 2)
             off *= plan.paced * 0.85 * np.sqrt(rng.random()) / np.linalg.norm(off)
-            start.append({"file": f"sonar_{i}.xyz", "x": round(float(origin[0] + off[0]), 1),
-                          "y": round(float(origin[1] + off[1]), 1), "within": plan.paced})
+            start.append(
+                {
+                    "file": f"sonar_{i}.xyz",
+                    "x": round(float(origin[0] + off[0]), 1),
+                    "y": round(float(origin[1] + off[1]), 1),
+                    "within": plan.paced,
+                }
+            )
     scene: dict = {"epsg": plan.epsg, "up": "-z" if plan.down else "+z", "water_level": plan.level}
     if plan.sound is not None:
         scene["sound_speed"] = list(plan.sound)

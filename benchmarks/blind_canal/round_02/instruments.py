@@ -15,13 +15,13 @@ class Ladder:
     """A ladder: where it stands, and its bars."""
 
     s: float
-    side: int            # 1 on the left, -1 on the right
-    foot: float          # height of its foot
+    side: int  # 1 on the left, -1 on the right
+    foot: float  # height of its foot
     length: float
     gap: float
     diameter: float
-    lean: float          # radians, towards the wall
-    stand: float         # distance of its foot from the nominal wall
+    lean: float  # radians, towards the wall
+    stand: float  # distance of its foot from the nominal wall
     seed: int
     step: float = 0.28
     spread: float = 0.009
@@ -55,8 +55,16 @@ def rope(a: np.ndarray, b: np.ndarray, sag: float, radius: float, parts: int = 1
     return [Bar(p[i], p[i + 1], radius, w.ROPE) for i in range(parts)]
 
 
-def laser(canal: Canal, station: np.ndarray, reach: float, n_along: int, n_round: int, groups: list[list[Bar]],
-          hulls: list[Hull], rng: np.random.Generator) -> np.ndarray:
+def laser(
+    canal: Canal,
+    station: np.ndarray,
+    reach: float,
+    n_along: int,
+    n_round: int,
+    groups: list[list[Bar]],
+    hulls: list[Hull],
+    rng: np.random.Generator,
+) -> np.ndarray:
     """Points of one laser station in the local frame. Directions follow a tube, as those of thinned scans do."""
     s = canal.to_sn(station[:1], station[1:2])[0][0]
     phi0 = canal.frame(float(s))[1]
@@ -103,13 +111,13 @@ class Sonar:
 
     s: float
     n: float
-    below: float               # depth of the head below the water of the sonar's day
-    heading: float             # degrees
+    below: float  # depth of the head below the water of the sonar's day
+    heading: float  # degrees
     tilt: tuple[float, float]  # degrees
     seed: int
-    beams: tuple[int, int] = (230, 520)   # in the fan, in the turn
+    beams: tuple[int, int] = (230, 520)  # in the fan, in the turn
     fan: tuple[float, float] = (-74.0, 58.0)
-    width: float = 1.0         # degrees
+    width: float = 1.0  # degrees
     sigma: float = 0.014
     rays: int = 8
     reach: float = 30.0
@@ -127,14 +135,16 @@ def rotation(heading: float, tilt: tuple[float, float], down: bool) -> np.ndarra
     return rz @ rx @ ry @ (np.diag([1.0, -1.0, -1.0]) if down else np.eye(3))
 
 
-def sonar(canal: Canal, head: Sonar, water: float, scale: float, down: bool, groups: list[list[Bar]],
-          hulls: list[Hull]) -> dict[str, np.ndarray]:
+def sonar(
+    canal: Canal, head: Sonar, water: float, scale: float, down: bool, groups: list[list[Bar]], hulls: list[Hull]
+) -> dict[str, np.ndarray]:
     """One scan: points of the file, and the pose and the check points in the local frame."""
     rng = np.random.default_rng(head.seed)
     rot = rotation(head.heading, head.tilt, down)
     o = canal.to_xyz(head.s, head.n, water - head.below)
-    el, az = np.meshgrid(np.radians(np.linspace(*head.fan, head.beams[0])),
-                         np.arange(head.beams[1]) / head.beams[1] * 2 * np.pi, indexing="ij")
+    el, az = np.meshgrid(
+        np.radians(np.linspace(*head.fan, head.beams[0])), np.arange(head.beams[1]) / head.beams[1] * 2 * np.pi, indexing="ij"
+    )
     el, az = el.ravel(), az.ravel()
     if down:
         el = -el
@@ -172,7 +182,7 @@ def sonar(canal: Canal, head: Sonar, water: float, scale: float, down: bool, gro
     t = np.where(np.isfinite(t), t, 999.0).reshape(n, k)
     strength = np.where(t < head.reach, strength.reshape(n, k) * np.exp(-t / 25), 0)
     # The strongest part of the footprint: the window of range with the largest sum.
-    total = np.stack([np.where(np.abs(t - t[:, j:j + 1]) < 0.05, strength, 0).sum(1) for j in range(k)], 1)
+    total = np.stack([np.where(np.abs(t - t[:, j : j + 1]) < 0.05, strength, 0).sum(1) for j in range(k)], 1)
     best = total.argmax(1)
     rows = np.arange(n)
     win = np.where(np.abs(t - t[rows, best][:, None]) < 0.05, strength, 0)
@@ -204,6 +214,12 @@ def sonar(canal: Canal, head: Sonar, water: float, scale: float, down: bool, gro
     pick = rng.choice(np.flatnonzero(good), 400, replace=False)
     local = axis[pick] * t0[pick, None] / scale
     false = (twice | across | lone | bg) & seen
-    return {"points": points, "rotation": rot, "origin": o, "check": local,
-            "share": np.array([false.sum() / seen.sum(), (seen & (bk == w.SURFACE)).sum() / seen.sum(),
-                               (seen & (bk == w.LADDER)).sum()])}
+    return {
+        "points": points,
+        "rotation": rot,
+        "origin": o,
+        "check": local,
+        "share": np.array(
+            [false.sum() / seen.sum(), (seen & (bk == w.SURFACE)).sum() / seen.sum(), (seen & (bk == w.LADDER)).sum()]
+        ),
+    }

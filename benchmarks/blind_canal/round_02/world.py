@@ -20,13 +20,13 @@ NONE, SOLID, LADDER, ROPE, BOAT, TRIPOD, SURFACE = range(7)
 class Box:
     """A recess (cut into a wall) or a pilaster (before a wall), in chainage and height."""
 
-    wall: str        # "R", "L" (the channel's walls) or "B" (the wall behind the towpath)
+    wall: str  # "R", "L" (the channel's walls) or "B" (the wall behind the towpath)
     s: float
     half: float
-    depth: float     # positive
+    depth: float  # positive
     low: float
     high: float
-    cut: bool        # True: recess
+    cut: bool  # True: recess
 
 
 @dataclass
@@ -35,9 +35,9 @@ class Pier:
 
     s: float
     n: float
-    half: float      # half length of the straight part
+    half: float  # half length of the straight part
     radius: float
-    top: float       # height of its top, under the deck
+    top: float  # height of its top, under the deck
 
 
 @dataclass
@@ -57,7 +57,7 @@ class Hull:
     centre: np.ndarray
     axes: tuple[float, float, float]
     heading: float
-    gunwale: float   # height of the open rim
+    gunwale: float  # height of the open rim
 
 
 @dataclass
@@ -73,16 +73,16 @@ class Canal:
     tow_width: float = 0.0
     tow_height: float = 0.5
     profile: dict[str, tuple[tuple[float, ...], tuple[float, ...]]] = default(default_factory=dict)
-    ledges: tuple[tuple[str, float, float], ...] = ()     # wall, height of the top, width
+    ledges: tuple[tuple[str, float, float], ...] = ()  # wall, height of the top, width
     boxes: list[Box] = default(default_factory=list)
     piers: list[Pier] = default(default_factory=list)
     deck: tuple[float, float, float, float] | None = None  # chainage, half width, low, high
     holes: tuple[tuple[float, float, float, float], ...] = ()  # s, n, radius, depth of scour
-    stones: float = 0.05                                    # a square metre
-    bend: tuple[float, float] | None = None                 # amplitude, wave length
+    stones: float = 0.05  # a square metre
+    bend: tuple[float, float] | None = None  # amplitude, wave length
     masonry: tuple[float, float, float] = (0.6, 0.3, 0.004)  # block length, block height, offset of faces
     joint: float = 0.006
-    wave: float = 0.01                                      # slow changes of the walls along the canal
+    wave: float = 0.01  # slow changes of the walls along the canal
     margin: float = 35.0
     cell: float = 0.05
 
@@ -133,19 +133,19 @@ class Canal:
         edge = np.clip(self.half - np.abs(n), 0, None)
         mud = gaussian_filter(rng.random((ns, 2)), (20, 0))
         mud = 0.22 + 0.12 * (mud - mud.mean()) / mud.std()
-        bed += np.where(n[None, :] < 0, mud[:, :1], mud[:, 1:]) * np.exp(-(edge[None, :] / 0.6) ** 2)
+        bed += np.where(n[None, :] < 0, mud[:, :1], mud[:, 1:]) * np.exp(-((edge[None, :] / 0.6) ** 2))
         s = self.s0 + np.arange(ns) * c
         for hs, hn, r, d in self.holes:
-            k = (np.abs(s - hs) < 4 * r)
+            k = np.abs(s - hs) < 4 * r
             q = ((s[k, None] - hs) / (1.5 * r)) ** 2 + ((n[None, :] - hn) / r) ** 2
-            bed[k] += -d * np.exp(-q) + 0.25 * d * np.exp(-(np.sqrt(q) - 1.9) ** 2 / 0.2)
+            bed[k] += -d * np.exp(-q) + 0.25 * d * np.exp(-((np.sqrt(q) - 1.9) ** 2) / 0.2)
         for _ in range(int(self.stones * ns * nn * c * c)):
             cs, cn = rng.uniform(s[0], s[-1]), rng.uniform(-self.half + 0.3, self.half - 0.3)
             r, h = rng.uniform(0.12, 0.4), rng.uniform(0.08, 0.3)
             a, b = int((cs - s[0]) / c), int((cn - n[0]) / c)
             sl = (slice(max(a - 8, 0), a + 9), slice(max(b - 8, 0), b + 9))
             q = ((s[sl[0], None] - cs) ** 2 + (n[None, sl[1]] - cn) ** 2) / r**2
-            bed[sl] += h * np.exp(-q**1.5)
+            bed[sl] += h * np.exp(-(q**1.5))
         self.bed = bed.astype(np.float32)
         self.bed_top = float(bed.max())
 
@@ -263,8 +263,9 @@ def march(canal: Canal, o: np.ndarray, d: np.ndarray, tmax: float, water: float,
     return out
 
 
-def bar_hits(o: np.ndarray, d: np.ndarray, bars: list[Bar], t: np.ndarray, kind: np.ndarray, cos: np.ndarray,
-             water: float, side: int) -> None:
+def bar_hits(
+    o: np.ndarray, d: np.ndarray, bars: list[Bar], t: np.ndarray, kind: np.ndarray, cos: np.ndarray, water: float, side: int
+) -> None:
     """Shorten rays to the bars that they meet, real (on the instrument's side of the water) or mirrored."""
     if not bars:
         return
@@ -301,8 +302,9 @@ def bar_hits(o: np.ndarray, d: np.ndarray, bars: list[Bar], t: np.ndarray, kind:
             t[g], kind[g], cos[g] = tt, bar.kind, np.abs((normal * ds[k]).sum(1))
 
 
-def hull_hits(o: np.ndarray, d: np.ndarray, hulls: list[Hull], t: np.ndarray, kind: np.ndarray, cos: np.ndarray,
-              water: float, side: int) -> None:
+def hull_hits(
+    o: np.ndarray, d: np.ndarray, hulls: list[Hull], t: np.ndarray, kind: np.ndarray, cos: np.ndarray, water: float, side: int
+) -> None:
     """As bar_hits, for boats."""
     for hull in hulls:
         for mirror in (False, True):
@@ -328,8 +330,17 @@ def hull_hits(o: np.ndarray, d: np.ndarray, hulls: list[Hull], t: np.ndarray, ki
                     cos[ok] = np.abs((normal * dd[ok]).sum(1))
 
 
-def cast(canal: Canal, o: np.ndarray, d: np.ndarray, tmax: float, water: float, side: int, groups: list[list[Bar]],
-         hulls: list[Hull], incidence: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def cast(
+    canal: Canal,
+    o: np.ndarray,
+    d: np.ndarray,
+    tmax: float,
+    water: float,
+    side: int,
+    groups: list[list[Bar]],
+    hulls: list[Hull],
+    incidence: bool,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Length, kind, cosine of incidence and upward part of the normal for each ray. Side is 1 above the water, -1 below."""
     t = march(canal, o, d, tmax, water, side)
     kind = np.where(np.isfinite(t), SOLID, NONE).astype(np.int8)
@@ -338,14 +349,15 @@ def cast(canal: Canal, o: np.ndarray, d: np.ndarray, tmax: float, water: float, 
         s = canal.to_sn(o[:1], o[1:2])[0][0]
         feats = canal.near(s - tmax, s + tmax)
         for lo in range(0, len(d), CHUNK):
-            k = lo + np.flatnonzero(np.isfinite(t[lo:lo + CHUNK]))
+            k = lo + np.flatnonzero(np.isfinite(t[lo : lo + CHUNK]))
             p = o + t[k, None] * d[k]
             sign = np.where(side * (p[:, 2] - water) < 0, -1.0, 1.0)
             p[:, 2] = fold(p[:, 2], water, side)
             h = 0.03
             f0 = canal.field(p[:, 0], p[:, 1], p[:, 2], feats)
-            g = np.stack([canal.field(p[:, 0] + h * e[0], p[:, 1] + h * e[1], p[:, 2] + h * e[2], feats) - f0
-                          for e in np.eye(3)], axis=1)
+            g = np.stack(
+                [canal.field(p[:, 0] + h * e[0], p[:, 1] + h * e[1], p[:, 2] + h * e[2], feats) - f0 for e in np.eye(3)], axis=1
+            )
             g /= np.maximum(np.linalg.norm(g, axis=1), 1e-6)[:, None]
             up[k] = g[:, 2]
             g[:, 2] *= sign

@@ -82,7 +82,10 @@ def noise(rng: np.random.Generator, shape: Sequence[int], step: float, octaves: 
 
 
 def noise_raster(
-    rng: np.random.Generator, low: tuple[float, float], high: tuple[float, float], step: float,
+    rng: np.random.Generator,
+    low: tuple[float, float],
+    high: tuple[float, float],
+    step: float,
     octaves: Sequence[tuple[float, float]],
 ) -> Raster2:
     """A raster of noise over a rectangle."""
@@ -121,8 +124,17 @@ class Canal:
             self.bars.append((np.asarray(a, float), np.asarray(b, float), radius))
 
     def ladder(
-        self, rng: np.random.Generator, foot: np.ndarray, up: np.ndarray, across: np.ndarray, length: float, gap: float,
-        diameter: float, heights: np.ndarray, missing: Sequence[int] = (), bent: dict[int, np.ndarray] | None = None,
+        self,
+        rng: np.random.Generator,
+        foot: np.ndarray,
+        up: np.ndarray,
+        across: np.ndarray,
+        length: float,
+        gap: float,
+        diameter: float,
+        heights: np.ndarray,
+        missing: Sequence[int] = (),
+        bent: dict[int, np.ndarray] | None = None,
         zero: float = 0.0,
     ) -> None:
         """A ladder; the surveyor's list has the rungs that are there, measured to the millimetre."""
@@ -142,8 +154,9 @@ class Canal:
             middle = h
             if bent and i in bent:
                 m = bent[i]
-                self.bar(np.array([a, 0.7 * a + 0.3 * b + 0.8 * m, 0.5 * (a + b) + m, 0.3 * a + 0.7 * b + 0.8 * m, b]),
-                         diameter / 2)
+                self.bar(
+                    np.array([a, 0.7 * a + 0.3 * b + 0.8 * m, 0.5 * (a + b) + m, 0.3 * a + 0.7 * b + 0.8 * m, b]), diameter / 2
+                )
                 middle = h + float(m @ up)
             else:
                 self.bar(np.array([a, b]), diameter / 2)
@@ -249,8 +262,13 @@ def fresnel(cosine: np.ndarray) -> np.ndarray:
 
 
 def laser_window(
-    canal: Canal, o: np.ndarray, azimuth: tuple[float, float], elevation: tuple[float, float], step: float,
-    rng: np.random.Generator, reach: float = 28.0,
+    canal: Canal,
+    o: np.ndarray,
+    azimuth: tuple[float, float],
+    elevation: tuple[float, float],
+    step: float,
+    rng: np.random.Generator,
+    reach: float = 28.0,
 ) -> np.ndarray:
     """Points of one window of a laser scan (degrees), in the canal's frame."""
     az = np.radians(np.arange(azimuth[0], azimuth[1], step))
@@ -292,8 +310,13 @@ def laser_window(
 
 
 def laser(
-    canal: Canal, stations: np.ndarray, step: float, rng: np.random.Generator, fine: float = 0.08,
-    band: tuple[float, float] | None = None, fine_reach: float = 9.0,
+    canal: Canal,
+    stations: np.ndarray,
+    step: float,
+    rng: np.random.Generator,
+    fine: float = 0.08,
+    band: tuple[float, float] | None = None,
+    fine_reach: float = 9.0,
 ) -> tuple[np.ndarray, np.ndarray]:
     """All stations: a dome, a finer band of elevations if asked for, and finer windows at the ladders."""
     points, sources = [], []
@@ -302,8 +325,10 @@ def laser(
         if band:
             parts.append(laser_window(canal, o, (0.0, 360.0), band, step / 2, rng))
         for low, high in canal.ladder_boxes:
-            corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1])
-                                for z in (max(low[2], 0.0), high[2])]) - o
+            corners = (
+                np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (max(low[2], 0.0), high[2])])
+                - o
+            )
             if np.linalg.norm(corners.mean(axis=0)) > fine_reach:
                 continue
             az = np.degrees(np.arctan2(corners[:, 1], corners[:, 0]))
@@ -359,9 +384,7 @@ COARSE = ((0.0, 1), (0.40, 6))
 FINE = ((0.0, 1), (0.20, 6), (0.40, 12), (0.60, 12))
 
 
-def footprint(
-    u: np.ndarray, rings: tuple[tuple[float, int], ...], rng: np.random.Generator
-) -> tuple[np.ndarray, np.ndarray]:
+def footprint(u: np.ndarray, rings: tuple[tuple[float, int], ...], rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """Rays on rings about the middle of each beam of 1 degree (angle, number), and their two-way weights."""
     n = len(u)
     side = np.where(np.abs(u[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
@@ -381,8 +404,9 @@ def footprint(
     return rays, weight / weight.sum()
 
 
-def strength(canal: Canal, o: np.ndarray, d: np.ndarray, r: np.ndarray, kind: np.ndarray, which: np.ndarray,
-             steel: float) -> np.ndarray:
+def strength(
+    canal: Canal, o: np.ndarray, d: np.ndarray, r: np.ndarray, kind: np.ndarray, which: np.ndarray, steel: float
+) -> np.ndarray:
     """Backscatter of what each ray has met: mud is weak, walls middling, bars strong where hit square."""
     s = np.zeros(len(d))
     solid = np.flatnonzero(kind == SOLID)
@@ -516,8 +540,16 @@ def sonar(canal: Canal, head: Sonar, rng: np.random.Generator) -> tuple[np.ndarr
 
 
 def write(
-    folder: Path, canal: Canal, points: np.ndarray, sources: np.ndarray, stations: np.ndarray, axis: np.ndarray,
-    scans: list[tuple[np.ndarray, dict]], up: str, extra: dict, rng: np.random.Generator,
+    folder: Path,
+    canal: Canal,
+    points: np.ndarray,
+    sources: np.ndarray,
+    stations: np.ndarray,
+    axis: np.ndarray,
+    scans: list[tuple[np.ndarray, dict]],
+    up: str,
+    extra: dict,
+    rng: np.random.Generator,
 ) -> dict:
     """All files of the contract; returns what may be of interest while building a scene."""
     folder = Path(folder)
@@ -540,8 +572,11 @@ def write(
 
     table("stations.csv", "scan_id,x,y,z", [[i, *(f"{v:.3f}" for v in p)] for i, p in enumerate(canal.world(stations), 1)])
     table("axis.csv", "x,y,z", [[f"{v:.3f}" for v in p] for p in canal.world(axis)])
-    table("ladders.csv", "ladder,rung,height,stile_gap,diameter",
-          [[a, b, f"{h:.3f}", f"{g:.3f}", f"{q:.3f}"] for a, b, h, g, q in canal.rungs])
+    table(
+        "ladders.csv",
+        "ladder,rung,height,stile_gap,diameter",
+        [[a, b, f"{h:.3f}", f"{g:.3f}", f"{q:.3f}"] for a, b, h, g, q in canal.rungs],
+    )
     shares = []
     for number, (local, entry) in enumerate(scans, start=1):
         np.savetxt(folder / f"sonar_{number}.xyz", local, fmt="%.3f")

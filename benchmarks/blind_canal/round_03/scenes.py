@@ -7,7 +7,15 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.blind_canal.round_03.cast import (
-    Canal, Raster2, Raster3, Sonar, laser, noise, noise_raster, sonar, write,
+    Canal,
+    Raster2,
+    Raster3,
+    Sonar,
+    laser,
+    noise,
+    noise_raster,
+    sonar,
+    write,
 )
 
 
@@ -61,17 +69,30 @@ def rock_cut(folder: Path) -> dict:
             f[deep] = near
         return f
 
-    canal = Canal(field, low + [1, 0.2, 0.2], high - [1, 0.2, 0.2], np.radians(63.0),
-                  np.array([912340.0, 6487210.0, 214.36]), 2154)
+    canal = Canal(
+        field, low + [1, 0.2, 0.2], high - [1, 0.2, 0.2], np.radians(63.0), np.array([912340.0, 6487210.0, 214.36]), 2154
+    )
     stations = np.array([[4.5, 0.4, 1.25], [14.8, -0.6, 1.35], [24.7, 0.5, 1.2], [35.0, -0.3, 1.3], [42.0, 0.2, 1.3]])
     points, sources = laser(canal, stations, 0.42, rng, band=(-26.0, 2.0))
     # the water stood 3 mm lower when the sonar was there
-    scans = [sonar(canal, h, rng) for h in heads(
-        [(10.4, 0.35, -0.92, 131.0, 2.2, 40.0, -0.003), (21.6, -0.5, -0.85, 287.0, 4.6, 200.0, -0.003),
-         (33.1, 0.2, -1.0, 18.0, 1.4, 310.0, -0.003)],
-        1452.6 / 1470.0, fan=(-78.0, 84.0), beam_step=0.8, pan_step=0.9, sigma=0.013)]
-    return write(folder, canal, points, sources, stations, centre(length, 5.0, 1.2), scans, "+z",
-                 {"sound_speed": [1470.0, 1453.0]}, rng)
+    scans = [
+        sonar(canal, h, rng)
+        for h in heads(
+            [
+                (10.4, 0.35, -0.92, 131.0, 2.2, 40.0, -0.003),
+                (21.6, -0.5, -0.85, 287.0, 4.6, 200.0, -0.003),
+                (33.1, 0.2, -1.0, 18.0, 1.4, 310.0, -0.003),
+            ],
+            1452.6 / 1470.0,
+            fan=(-78.0, 84.0),
+            beam_step=0.8,
+            pan_step=0.9,
+            sigma=0.013,
+        )
+    ]
+    return write(
+        folder, canal, points, sources, stations, centre(length, 5.0, 1.2), scans, "+z", {"sound_speed": [1470.0, 1453.0]}, rng
+    )
 
 
 # ---------------------------------------------------------------- 2: brick
@@ -87,8 +108,13 @@ def brick(folder: Path) -> dict:
     mud = -1.98 + 0.62 * np.exp(-(y + 2.15) / 0.55) + 0.50 * np.exp(-(2.0 - y) / 0.5)
     mud += noise(rng, x.shape, 0.12, [(0.9, 0.06), (0.3, 0.02)])
     bed = Raster2(np.clip(mud, -2.6, -0.95), (-4.0, -3.2), 0.12)
-    stones = [(7.4, 0.6, -1.9, 0.22), (13.2, -0.9, -1.85, 0.3), (16.0, 0.3, -1.95, 0.26), (22.3, 0.8, -1.8, 0.3),
-              (24.9, -0.4, -1.9, 0.2)]
+    stones = [
+        (7.4, 0.6, -1.9, 0.22),
+        (13.2, -0.9, -1.85, 0.3),
+        (16.0, 0.3, -1.95, 0.26),
+        (22.3, 0.8, -1.8, 0.3),
+        (24.9, -0.4, -1.9, 0.2),
+    ]
 
     def joints(x: np.ndarray, z: np.ndarray) -> np.ndarray:
         """Courses of 75 mm in stretcher bond, joints 6 mm deep that are open here and there."""
@@ -108,18 +134,41 @@ def brick(folder: Path) -> dict:
             f = np.minimum(f, np.sqrt((x - a) ** 2 + (y - b) ** 2 + (z - c) ** 2) - r)
         return f
 
-    canal = Canal(field, low + [0.5, 0.2, 0.2], high - [0.5, 0.2, 0.2], np.radians(-148.0),
-                  np.array([531480.0, 181955.0, 31.82]), 27700)
+    canal = Canal(
+        field, low + [0.5, 0.2, 0.2], high - [0.5, 0.2, 0.2], np.radians(-148.0), np.array([531480.0, 181955.0, 31.82]), 27700
+    )
     # first ladder: leans on the upright wall; two rungs broken out, one bent
     up = np.array([0.02, -0.09, 1.0])
     heights = 0.22 + 0.285 * np.arange(14) + rng.normal(0, 0.006, 14)
-    canal.ladder(rng, np.array([9.1, -1.72, -2.12]), up, np.array([1.0, 0.0, -0.02]), 4.05, 0.38, 0.030, heights,
-                 missing=(5, 9), bent={10: np.array([0.01, 0.035, -0.055])}, zero=0.10)
+    canal.ladder(
+        rng,
+        np.array([9.1, -1.72, -2.12]),
+        up,
+        np.array([1.0, 0.0, -0.02]),
+        4.05,
+        0.38,
+        0.030,
+        heights,
+        missing=(5, 9),
+        bent={10: np.array([0.01, 0.035, -0.055])},
+        zero=0.10,
+    )
     # second ladder: parallel to the battered wall; two missing (one in the water), one bent below it
     up = np.array([-0.01, lean, 1.0])
     heights = 0.20 + 0.295 * np.arange(13) + rng.normal(0, 0.008, 13)
-    canal.ladder(rng, np.array([20.3, 1.76, -2.05]), up, np.array([1.0, 0.0, 0.01]), 3.95, 0.40, 0.028, heights,
-                 missing=(4, 11), bent={6: np.array([0.0, -0.04, -0.05])}, zero=1.3)
+    canal.ladder(
+        rng,
+        np.array([20.3, 1.76, -2.05]),
+        up,
+        np.array([1.0, 0.0, 0.01]),
+        3.95,
+        0.40,
+        0.028,
+        heights,
+        missing=(4, 11),
+        bent={6: np.array([0.0, -0.04, -0.05])},
+        zero=1.3,
+    )
     # ropes in front of the second one: a slack one and one that hangs from a ring
     t = np.linspace(0, 1, 13)
     sag = np.sin(np.pi * t)
@@ -129,10 +178,23 @@ def brick(folder: Path) -> dict:
     stations = np.array([[4.0, 0.2, 1.3], [11.6, -0.2, 1.25], [18.6, -0.3, 1.35], [26.0, 0.1, 1.3]])
     points, sources = laser(canal, stations, 0.38, rng, fine=0.07)
     # tilting the head on its bracket moves it by some centimetres; the water is 6 mm higher than for the laser
-    scans = [sonar(canal, h, rng) for h in heads(
-        [(11.9, 0.10, -0.62, 74.0, 0.4, 10.0, 0.006), (11.932, 0.115, -0.641, 74.3, 9.0, 22.0, 0.006),
-         (17.7, -0.25, -0.58, 251.0, 0.7, 120.0, 0.006), (17.681, -0.222, -0.603, 250.8, 9.0, 118.0, 0.006)],
-        1448.0 / 1465.0, fan=(-70.0, 75.0), beam_step=0.5, pan_step=1.0, sigma=0.012, down=True)]
+    scans = [
+        sonar(canal, h, rng)
+        for h in heads(
+            [
+                (11.9, 0.10, -0.62, 74.0, 0.4, 10.0, 0.006),
+                (11.932, 0.115, -0.641, 74.3, 9.0, 22.0, 0.006),
+                (17.7, -0.25, -0.58, 251.0, 0.7, 120.0, 0.006),
+                (17.681, -0.222, -0.603, 250.8, 9.0, 118.0, 0.006),
+            ],
+            1448.0 / 1465.0,
+            fan=(-70.0, 75.0),
+            beam_step=0.5,
+            pan_step=1.0,
+            sigma=0.012,
+            down=True,
+        )
+    ]
     return write(folder, canal, points, sources, stations, centre(length, 3.0, 0.0), scans, "-z", {}, rng)
 
 
@@ -181,8 +243,10 @@ def bends(folder: Path) -> dict:
         wall_right = b + t - ledge + walls[1](x, z)
         water = np.minimum(np.minimum(wall_left, wall_right), np.minimum(z - bed(x, t), 1.2 - z))
         c, d = a + at(x, path_left), b + at(x, path_right)
-        air = np.minimum(vault(t - 0.5 * (c - d), z, 0.5 * (c + d), 1.7, 2.2) + lining(x, np.where(t > 0, z, z - 0.7)),
-                         z - 0.42 - 0.4 * walls[0](x, t * 0.5 - 1.0))
+        air = np.minimum(
+            vault(t - 0.5 * (c - d), z, 0.5 * (c + d), 1.7, 2.2) + lining(x, np.where(t > 0, z, z - 0.7)),
+            z - 0.42 - 0.4 * walls[0](x, t * 0.5 - 1.0),
+        )
         f = np.maximum(water, air)
         for bx, hx, bt, ht, bz, hz in boxes:
             near = np.flatnonzero(np.abs(x - bx) < hx + 4.0)
@@ -191,8 +255,9 @@ def bends(folder: Path) -> dict:
             f[near] = np.minimum(f[near], box)
         return 0.96 * f
 
-    canal = Canal(field, low + [0.5, 0.2, 0.2], high - [0.5, 0.2, 0.2], np.radians(21.0),
-                  np.array([363720.0, 5620480.0, 98.115]), 25832)
+    canal = Canal(
+        field, low + [0.5, 0.2, 0.2], high - [0.5, 0.2, 0.2], np.radians(21.0), np.array([363720.0, 5620480.0, 98.115]), 25832
+    )
 
     def place(x: float, t: float, z: float) -> np.ndarray:
         return np.array([x, np.interp(x, grid, line) + t * np.sqrt(1 + np.interp(x, grid, slope) ** 2), z])
@@ -207,19 +272,50 @@ def bends(folder: Path) -> dict:
         n = 12 + number % 2
         heights = 0.15 + 0.300 * np.arange(n) + rng.normal(0, 0.005, n)
         lean = np.array([0.006 * (number - 1.5), side * 0.012, 1.0])
-        canal.ladder(rng, place(x, side * off, -1.95 - 0.05 * number), lean, along, 0.25 + 0.3 * n, 0.42, 0.032, heights,
-                     zero=-0.4 * number)
-    stations = np.array([place(*p) for p in [(6, 3.1, 1.8), (19, -3.2, 1.85), (32, 3.1, 1.8), (44, -3.3, 1.8), (57, -3.4, 1.85),
-                                             (70, 3.1, 1.8), (83, -3.1, 1.8), (95, 3.0, 1.8)]])
+        canal.ladder(
+            rng,
+            place(x, side * off, -1.95 - 0.05 * number),
+            lean,
+            along,
+            0.25 + 0.3 * n,
+            0.42,
+            0.032,
+            heights,
+            zero=-0.4 * number,
+        )
+    stations = np.array(
+        [
+            place(*p)
+            for p in [
+                (6, 3.1, 1.8),
+                (19, -3.2, 1.85),
+                (32, 3.1, 1.8),
+                (44, -3.3, 1.8),
+                (57, -3.4, 1.85),
+                (70, 3.1, 1.8),
+                (83, -3.1, 1.8),
+                (95, 3.0, 1.8),
+            ]
+        ]
+    )
     points, sources = laser(canal, stations, 0.55, rng, fine=0.08, fine_reach=10.0)
     poses = []
     for i, x in enumerate(18.0 + 12.0 * np.arange(6)):
         p = place(x, [0.4, -0.6, 0.2, 0.9, -0.3, 0.5][i], -0.75 - 0.05 * (i % 3))
         # the level falls by 3 cm while the sonar goes from station to station
-        poses.append((*p, [33.0, 151.0, 304.0, 88.0, 219.0, 12.0][i], [1.1, 3.4, 0.6, 2.3, 5.2, 1.7][i],
-                      [20.0, 95.0, 180.0, 260.0, 330.0, 145.0][i], -0.006 * i))
-    scans = [sonar(canal, h, rng) for h in heads(
-        poses, 1 - 0.018, fan=(-72.0, 66.0), beam_step=0.5, pan_step=1.2, sigma=0.015, reach=18.0)]
+        poses.append(
+            (
+                *p,
+                [33.0, 151.0, 304.0, 88.0, 219.0, 12.0][i],
+                [1.1, 3.4, 0.6, 2.3, 5.2, 1.7][i],
+                [20.0, 95.0, 180.0, 260.0, 330.0, 145.0][i],
+                -0.006 * i,
+            )
+        )
+    scans = [
+        sonar(canal, h, rng)
+        for h in heads(poses, 1 - 0.018, fan=(-72.0, 66.0), beam_step=0.5, pan_step=1.2, sigma=0.015, reach=18.0)
+    ]
     start = []
     for number in (2, 5):
         p = canal.world(np.array(poses[number - 1][:3])) + rng.normal(0, 0.6, 3)
@@ -240,10 +336,17 @@ def chamber(folder: Path) -> dict:
     bed = noise_raster(rng, (-4.0, -3.8), (length + 4.0, 3.8), 0.15, [(1.5, 0.05), (0.4, 0.025)])
     half = 2.62
     # x0, x1, side, depth, bottom, top: recesses that are open to the chamber
-    recesses = [(3.4, 6.55, 1, 0.42, -2.55, 1.75), (3.4, 6.50, -1, 0.40, -2.55, 1.75), (18.2, 21.30, 1, 0.42, -4.5, 1.75),
-                (18.25, 21.30, -1, 0.43, -4.5, 1.75), (1.9, 2.16, 1, 0.20, -4.5, 1.75), (1.9, 2.15, -1, 0.20, -4.5, 1.75),
-                (23.1, 23.36, 1, 0.20, -4.5, 1.75), (23.12, 23.36, -1, 0.21, -4.5, 1.75),
-                (11.2, 11.95, 1, 0.34, -3.05, 1.72)]  # the last is the ladder's niche
+    recesses = [
+        (3.4, 6.55, 1, 0.42, -2.55, 1.75),
+        (3.4, 6.50, -1, 0.40, -2.55, 1.75),
+        (18.2, 21.30, 1, 0.42, -4.5, 1.75),
+        (18.25, 21.30, -1, 0.43, -4.5, 1.75),
+        (1.9, 2.16, 1, 0.20, -4.5, 1.75),
+        (1.9, 2.15, -1, 0.20, -4.5, 1.75),
+        (23.1, 23.36, 1, 0.20, -4.5, 1.75),
+        (23.12, 23.36, -1, 0.21, -4.5, 1.75),
+        (11.2, 11.95, 1, 0.34, -3.05, 1.72),
+    ]  # the last is the ladder's niche
     quoins = [(6.62, 2.72, 0.26, -2.55), (6.57, -2.72, 0.26, -2.55), (21.37, 2.73, 0.27, -4.5), (21.37, -2.73, 0.27, -4.5)]
 
     def field(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
@@ -266,18 +369,37 @@ def chamber(folder: Path) -> dict:
         steep = np.where(np.abs(x - 6.95) < 0.3, 0.15, 1.0)  # keeps the steps short at the drop
         return np.minimum(f + n, (z + 3.8 - bed(x, y) - sill - mud) * steep)
 
-    canal = Canal(field, low + [0.5, 0.2, 0.2], high - [0.5, 0.2, 0.2], np.radians(107.0),
-                  np.array([148330.0, 169870.0, 57.244]), 31370)
+    canal = Canal(
+        field, low + [0.5, 0.2, 0.2], high - [0.5, 0.2, 0.2], np.radians(107.0), np.array([148330.0, 169870.0, 57.244]), 31370
+    )
     heights = 0.18 + 0.290 * np.arange(15) + rng.normal(0, 0.004, 15)
-    canal.ladder(rng, np.array([11.565, half + 0.12, -2.75]), np.array([0.004, 0.003, 1.0]), np.array([1.0, 0.0, 0.003]),
-                 4.38, 0.45, 0.026, heights, zero=0.55)
+    canal.ladder(
+        rng,
+        np.array([11.565, half + 0.12, -2.75]),
+        np.array([0.004, 0.003, 1.0]),
+        np.array([1.0, 0.0, 0.003]),
+        4.38,
+        0.45,
+        0.026,
+        heights,
+        zero=0.55,
+    )
     # gauge board and a sunken beam, and a rope that has fallen in
     canal.bar(np.array([[14.2, -2.5, -0.9], [15.9, 1.2, -3.55]]), 0.09)
     t = np.linspace(0, 1, 9)
     canal.bar(np.stack([8.9 + 0.5 * t, -2.5 + 0.2 * t, 1.3 - 3.2 * t], axis=1), 0.011)
     stations = np.array([[2.6, -0.8, 1.45], [9.3, 0.9, 1.4], [15.2, -0.9, 1.4], [22.4, 0.5, 1.45]])
     points, sources = laser(canal, stations, 0.36, rng, fine=0.07)
-    scans = [sonar(canal, h, rng) for h in heads(
-        [(9.2, -0.45, -1.50, 199.0, 1.8, 75.0, -0.002), (15.8, 0.55, -1.52, 340.0, 3.1, 290.0, -0.002)],
-        1479.5 / 1465.0, fan=(-80.0, 80.0), beam_step=0.5, pan_step=0.9, sigma=0.013, down=True)]
+    scans = [
+        sonar(canal, h, rng)
+        for h in heads(
+            [(9.2, -0.45, -1.50, 199.0, 1.8, 75.0, -0.002), (15.8, 0.55, -1.52, 340.0, 3.1, 290.0, -0.002)],
+            1479.5 / 1465.0,
+            fan=(-80.0, 80.0),
+            beam_step=0.5,
+            pan_step=0.9,
+            sigma=0.013,
+            down=True,
+        )
+    ]
     return write(folder, canal, points, sources, stations, centre(length, 2.5, 1.0), scans, "-z", {}, rng)

@@ -247,6 +247,7 @@ def switchgear(folder: Path) -> None:
                 w.pipe((x + 0.016, -0.008, z - 0.04), (x + 0.016, -0.008, z + 0.04), 0.008, ZINC)
         x += wide
     w.box((x + 0.01, 0.0, 0.1), (x + 0.02, 0.62, 2.15), STAINLESS)  # bare end plate
+
     # Tray of mesh above, conduits, cables that hang before the doors, an extinguisher, a stool.
     def mesh(s, t):
         return (((s % 0.05) > 0.006) & ((t % 0.1) > 0.006)).astype(float)

@@ -20,8 +20,16 @@ def angle(w: World, p0, p1, leg: float, thick: float, mat: Material, edge: float
     sign = -1.0 if front else 1.0
     y = sign * (0.006 + thick / 2)
     flat = w.bar(p0, p1, (0, 1, 0), leg, thick, mat, out=y)
-    out = w.bar(p0, p1, (0, 1, 0), thick, leg - thick, mat, out=sign * (0.006 + thick + (leg - thick) / 2),
-                shift=edge * (leg - thick) / 2)
+    out = w.bar(
+        p0,
+        p1,
+        (0, 1, 0),
+        thick,
+        leg - thick,
+        mat,
+        out=sign * (0.006 + thick + (leg - thick) / 2),
+        shift=edge * (leg - thick) / 2,
+    )
     return flat, out
 
 
@@ -137,8 +145,15 @@ def weathering(folder: Path) -> None:
     wet = both(runs([(-0.2, 0.3, 1.22, 0.4), (0.18, 0.3, 1.0, 0.28)], 61), blotch(-0.05, 0.18, 0.35, 0.12, 62))
     w.anomaly(web, 2, wet, -2.9, "wet run", lobe=0.5)
     w.anomaly(web, 2, blotch(4.2, -0.35, 0.62, 0.3, 63, rough=0.35), 2.6, "salt stain")
-    w.anomaly(web, 2, blotch(-4.5, -0.4, 0.75, 0.36, 64, rough=0.3), 0.35, "thin salt film", uneven=0.3,
-              limit="The film differs by less than the natural mottle of the rust layer around it.")
+    w.anomaly(
+        web,
+        2,
+        blotch(-4.5, -0.4, 0.75, 0.36, 64, rough=0.3),
+        0.35,
+        "thin salt film",
+        uneven=0.3,
+        limit="The film differs by less than the natural mottle of the rust layer around it.",
+    )
     wet = both(blotch(-2.3, -0.75, 0.9, 0.32, 65), blotch(-1.5, -0.6, 0.5, 0.3, 66))
     w.anomaly(soffit, 4, wet, -2.3, "wet run under the edge", lobe=0.4)
     w.anomaly(soffit, 4, blotch(1.7, -0.3, 0.75, 0.38, 67, rough=0.35), 2.1, "salt stain")

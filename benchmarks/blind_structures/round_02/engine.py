@@ -14,6 +14,7 @@ from pyproj import CRS
 Field = Callable[[np.ndarray, np.ndarray], np.ndarray]
 WEIGHTS = np.array([0.36, 0.16, 0.16, 0.16, 0.16])  # energy of the sub-rays: centre, right, left, up, down
 
+
 # ---------------------------------------------------------------- textures
 def _hash(i: np.ndarray, j: np.ndarray, seed: int) -> np.ndarray:
     """A number of 0 to 1 for each lattice node."""
@@ -24,6 +25,7 @@ def _hash(i: np.ndarray, j: np.ndarray, seed: int) -> np.ndarray:
         h = (h ^ (h >> np.uint32(15))) * np.uint32(2654435761)
         h = h ^ (h >> np.uint32(16))
     return h / 2.0**32
+
 
 def noise(a: np.ndarray, b: np.ndarray, scale: float, seed: int, octaves: int = 2) -> np.ndarray:
     """Smooth noise of about -1 to 1 with structures of the given size in metres."""
@@ -42,6 +44,7 @@ def noise(a: np.ndarray, b: np.ndarray, scale: float, seed: int, octaves: int = 
         amp *= 0.5
     return out / total
 
+
 def spangle(a: np.ndarray, b: np.ndarray, size: float, seed: int) -> np.ndarray:
     """-1 to 1, constant on each zinc crystal: cells around jittered lattice nodes."""
     i, j = np.floor(a / size), np.floor(b / size)
@@ -56,19 +59,24 @@ def spangle(a: np.ndarray, b: np.ndarray, size: float, seed: int) -> np.ndarray:
             value = np.where(near, 2 * _hash(i + di, j + dj, seed + 2) - 1, value)
     return value
 
+
 def step01(x: np.ndarray) -> np.ndarray:
     """0 below 0, 1 above 1, smooth between."""
     x = np.clip(x, 0, 1)
     return x * x * (3 - 2 * x)
 
+
 # ---------------------------------------------------------------- shapes of anomalies: 0 to 1 over a face
 def foot(height: float, ragged: float, seed: int, axis: str = "b", soft: float = 0.02) -> Field:
     """Everything below a ragged line (to the left of one with the axis a)."""
+
     def level(a: np.ndarray, b: np.ndarray) -> np.ndarray:
         along, up = (a, b) if axis == "b" else (b, a)
         wave = noise(along, 0.4 * up, 0.09, seed) + 0.5 * noise(a, b, 0.03, seed + 1)
         return step01((height + ragged * wave - up) / soft + 0.5)
+
     return level
+
 
 def blob(a0: float, b0: float, ra: float, rb: float, ragged: float, seed: int, soft: float = 0.1, scale: float = 0.0) -> Field:
     """A ragged ellipse."""
@@ -77,7 +85,9 @@ def blob(a0: float, b0: float, ra: float, rb: float, ragged: float, seed: int, s
     def level(a: np.ndarray, b: np.ndarray) -> np.ndarray:
         r = np.hypot((a - a0) / ra, (b - b0) / rb)
         return step01((1 - r + ragged * noise(a, b, scale, seed, 3)) / soft + 0.5)
+
     return level
+
 
 def flakes(a0: float, b0: float, ra: float, rb: float, size: float, seed: int, share: float = 0.0) -> Field:
     """Flakes that came off within a ragged ellipse; sharp edges."""
@@ -86,10 +96,13 @@ def flakes(a0: float, b0: float, ra: float, rb: float, size: float, seed: int, s
     def level(a: np.ndarray, b: np.ndarray) -> np.ndarray:
         n = noise(a, b, size, seed, 3)
         return step01((n + share + 1.8 * (hull(a, b) - 1)) / 0.06 + 0.5)
+
     return level
+
 
 def streak(a0: float, top: float, length: float, width: float, seed: int) -> Field:
     """A run that starts narrow, wavers, widens and fades out downwards."""
+
     def level(a: np.ndarray, b: np.ndarray) -> np.ndarray:
         s = (top - b) / length
         mid = a0 + 0.25 * width * noise(b, 0 * b, 0.3, seed)
@@ -97,10 +110,13 @@ def streak(a0: float, top: float, length: float, width: float, seed: int) -> Fie
         inside = step01((half - np.abs(a - mid)) / (0.15 * width) + 0.5)
         ends = step01(s / 0.02) * step01((1 - s + 0.25 * noise(a, 0.2 * b, 0.05, seed + 2)) / 0.12)
         return inside * ends
+
     return level
+
 
 def strokes(lines: list[list[tuple[float, float]]], width: float, seed: int) -> Field:
     """Sprayed lines of one width."""
+
     def level(a: np.ndarray, b: np.ndarray) -> np.ndarray:
         best = np.full(a.shape, np.inf)
         for line in lines:
@@ -110,12 +126,15 @@ def strokes(lines: list[list[tuple[float, float]]], width: float, seed: int) -> 
                 s = np.clip(((a - q0[0]) * d[0] + (b - q0[1]) * d[1]) / (d @ d), 0, 1)
                 best = np.minimum(best, np.hypot(a - q0[0] - s * d[0], b - q0[1] - s * d[1]))
         return step01((0.5 * width * (1 + 0.15 * noise(a, b, 0.05, seed)) - best) / (0.15 * width) + 0.5)
+
     return level
+
 
 # ---------------------------------------------------------------- materials, surfaces
 @dataclass(frozen=True)
 class Material:
     """Reflection in dB: a base, a diffuse fall with the incidence, a lobe at 0 degrees, mottling and spangle."""
+
     base: float
     fall: float = 1.0
     lobe: float = 0.0
@@ -141,15 +160,18 @@ class Material:
             out = out + self.grain * noise(a, b, 0.03, seed + 12, 1)
         return out + self.crystals * s if self.crystals else out
 
+
 @dataclass
 class Surface:
     """One smooth surface; number 0 is anything that is none."""
+
     number: int
     material: Material
     seed: int
     tone: Field | None = None
     offset: float = 0.0
     flaws: list[Flaw] = field(default_factory=list)
+
     def evaluate(self, a: np.ndarray, b: np.ndarray, cosine: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Reflection in dB, the same without anomalies, number of the anomaly."""
         own = self.material.db(a, b, cosine, self.seed) + self.offset
@@ -165,29 +187,35 @@ class Surface:
                 ident[w >= 0.4] = flaw.number
         return now, own, ident
 
+
 @dataclass
 class Flaw:
     """An anomaly on one surface: another material, or the same one lighter or darker."""
+
     number: int
     kind: str
     level: Field
     material: Material | None = None
     change: float = 0.0
     limit: str = ""
+
     def reflection(self, own: np.ndarray, a: np.ndarray, b: np.ndarray, cosine: np.ndarray) -> np.ndarray:
         """Reflection in dB where the anomaly covers all."""
         if self.material is not None:
             return self.material.db(a, b, cosine, 900 + self.number)
         return own + self.change * (1 + 0.2 * noise(a, b, 0.12, 700 + self.number))
 
+
 def unit(v: np.ndarray) -> np.ndarray:
     """Of length 1."""
     v = np.asarray(v, float)
     return v / np.linalg.norm(v)
 
+
 @dataclass
 class Patch:
     """A flat rectangle, seen from both sides; `mask` cuts it to shape."""
+
     o: np.ndarray
     u: np.ndarray
     v: np.ndarray
@@ -195,10 +223,12 @@ class Patch:
     lv: float
     surface: Surface
     mask: Field | None = None
+
     def corners(self) -> np.ndarray:
         u, v = self.lu * self.u, self.lv * self.v
         p = self.o + np.array([0 * u, u, u + v, v])
         return np.stack([p, np.roll(p, -1, 0)], 1)
+
     def cast(self, dots: Callable, s: np.ndarray) -> np.ndarray:
         n = np.cross(self.u, self.v)
         rel = self.o - s
@@ -211,6 +241,7 @@ class Patch:
             where = np.nonzero(good)
             good[where] = self.mask(a[where].astype(float), b[where].astype(float))
         return np.where(good, t, np.float32(np.inf))
+
     def locate(self, d: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, ...]:
         n = np.cross(self.u, self.v)
         dn = d @ n
@@ -218,18 +249,22 @@ class Patch:
         p = s + t[:, None] * d - self.o
         return t, p @ self.u, p @ self.v, np.abs(dn)
 
+
 @dataclass
 class Tube:
     """The mantle of a cylinder; `ref` is where the coordinate around it is 0."""
+
     p: np.ndarray
     w: np.ndarray
     r: float
     length: float
     surface: Surface
     ref: np.ndarray
+
     def axes(self) -> tuple[np.ndarray, np.ndarray]:
         e1 = unit(self.ref - (self.ref @ self.w) * self.w)
         return e1, np.cross(self.w, e1)
+
     def corners(self) -> np.ndarray:
         e1, e2 = self.axes()
         out = []
@@ -239,6 +274,7 @@ class Tube:
             for end in (0, self.length * self.w):
                 out.append([q[k] + end, q[(k + 1) % 4] + end])
         return np.array(out)
+
     def cast(self, dots: Callable, s: np.ndarray) -> np.ndarray:
         e1, e2 = self.axes()
         rel = s - self.p
@@ -256,6 +292,7 @@ class Tube:
                 z = z0 + t * dz
                 out = np.where((disc > 0) & (t > 0.3) & (z >= 0) & (z <= self.length), t, out)
         return out
+
     def locate(self, d: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, ...]:
         e1, e2 = self.axes()
         rel = s - self.p
@@ -271,18 +308,22 @@ class Tube:
         x, y = rel @ e1 + t * dx, rel @ e2 + t * dy
         return t, self.r * np.arctan2(y, x), z, np.abs(x * dx + y * dy) / self.r
 
+
 @dataclass
 class Station:
     """Where the scanner stands (local), its window in degrees and its gain in dB."""
+
     at: tuple[float, float, float]
     azimuth: tuple[float, float]
     elevation: tuple[float, float]
     gain: float = 0.0
     step: float = 0.06
 
+
 @dataclass
 class Instrument:
     """What the scanner adds."""
+
     beam: float = 0.3  # mrad
     range_noise: float = 0.0015
     noise: float = 0.5
@@ -296,6 +337,7 @@ class Instrument:
     def of_range(self, t: np.ndarray) -> np.ndarray:
         """F(range): the fall with the distance, and the loss of a receiver that does not see all of a near spot."""
         return -self.power * np.log10(t / 10) + 10 * np.log10(1 - np.exp(-((t / self.near) ** 1.6)))
+
 
 class World:
     """Collects surfaces and primitives and writes the scene."""
@@ -315,8 +357,9 @@ class World:
         self.surfaces.append(s)
         return s
 
-    def flaw(self, surface: Surface, kind: str, level: Field, material: Material | None = None, change: float = 0.0,
-             limit: str = "") -> None:
+    def flaw(
+        self, surface: Surface, kind: str, level: Field, material: Material | None = None, change: float = 0.0, limit: str = ""
+    ) -> None:
         """Puts an anomaly on a surface."""
         f = Flaw(len(self.flaws) + 1, kind, level, material, change, limit)
         self.flaws.append(f)
@@ -345,8 +388,13 @@ class World:
         n = unit(n)
         u = unit(np.cross(n, (0.31, 0.2, 0.93)))
         v = np.cross(n, u)
-        return self.patch(np.asarray(c, float) - r * (u + v), 2 * r * u, 2 * r * v, surface,
-                          mask=lambda a, b: (np.hypot(a - r, b - r) <= r) & (np.hypot(a - r, b - r) >= inner))
+        return self.patch(
+            np.asarray(c, float) - r * (u + v),
+            2 * r * u,
+            2 * r * v,
+            surface,
+            mask=lambda a, b: (np.hypot(a - r, b - r) <= r) & (np.hypot(a - r, b - r) >= inner),
+        )
 
     def box(self, o, ex, ey, ez, material: Material | Surface, skip: str = "") -> dict[str, Surface]:
         """Six faces, each a surface (all on one where a surface is given)."""
@@ -402,9 +450,11 @@ class World:
             i, j = slice(w[0], w[1]), slice(w[2], w[3])
             c1, s1 = ce[None, None, j] - de * se[None, None, j], se[None, None, j] + de * ce[None, None, j]
             cc, ss = ca[i][None, :, None], sa[i][None, :, None]
+
             def dots(n, c1=c1, s1=s1, cc=cc, ss=ss):
                 n = np.asarray(n, np.float32)
                 return c1 * (cc * n[0] + ss * n[1]) + s1 * n[2] + da * (cc * n[1] - ss * n[0])
+
             t = prim.cast(dots, s)
             near = t < best[:, i, j]
             best[:, i, j][near] = t[near]
@@ -488,8 +538,20 @@ class World:
             tn = t[r] + rng.normal(0, 1, len(r)) * np.minimum(ins.range_noise * (1 + weak[r]), 0.003)
             value = amp[r] + ins.level + st.gain + drift[r] + rng.normal(0, 1, len(r)) * ins.noise * (1 + 0.5 * weak[r])
             s0 = np.where(pure[r], surf[0, r], 0)
-            out.append({"ray": ray[r], "t": tn, "amp": value, "surface": s0, "flaw": np.where(s0 > 0, flaw[0, r], 0),
-                        "cos": cosine[r], "delta": own[r], "a": ca[r], "b": cb[r], "echo": np.full(len(r), n + 1)})
+            out.append(
+                {
+                    "ray": ray[r],
+                    "t": tn,
+                    "amp": value,
+                    "surface": s0,
+                    "flaw": np.where(s0 > 0, flaw[0, r], 0),
+                    "cos": cosine[r],
+                    "delta": own[r],
+                    "a": ca[r],
+                    "b": cb[r],
+                    "echo": np.full(len(r), n + 1),
+                }
+            )
         if ins.echoes:
             count = np.bincount(np.concatenate([o["ray"] for o in out]), minlength=len(az) * len(el))
         if self.mirror is not None:
@@ -498,8 +560,20 @@ class World:
             pick = np.sort(rng.choice(sky, rng.binomial(len(sky), ins.false), replace=False))
             z = np.zeros(len(pick))
             amp = rng.normal(ins.floor + ins.level + st.gain + 2, 1, len(pick))
-            out.append({"ray": pick, "t": rng.uniform(1.5, 22, len(pick)), "amp": amp, "surface": z.astype(np.int32),
-                        "flaw": z.astype(np.int32), "cos": z + 1, "delta": z, "a": z, "b": z, "echo": z + 1})
+            out.append(
+                {
+                    "ray": pick,
+                    "t": rng.uniform(1.5, 22, len(pick)),
+                    "amp": amp,
+                    "surface": z.astype(np.int32),
+                    "flaw": z.astype(np.int32),
+                    "cos": z + 1,
+                    "delta": z,
+                    "a": z,
+                    "b": z,
+                    "echo": z + 1,
+                }
+            )
         p = {k: np.concatenate([o[k] for o in out]) for k in out[0]}
         order = np.lexsort((p["echo"], p["ray"]))
         p = {k: v[order] for k, v in p.items()}
@@ -538,8 +612,16 @@ class World:
         g["surface"][r], g["flaw"][r] = 0, 0
         return out
 
-    def write(self, folder: Path, stations: list[Station], ins: Instrument, origin: tuple[float, float, float], turn: float,
-              epsg: int, software: str) -> None:
+    def write(
+        self,
+        folder: Path,
+        stations: list[Station],
+        ins: Instrument,
+        origin: tuple[float, float, float],
+        turn: float,
+        epsg: int,
+        software: str,
+    ) -> None:
         """Scans from all stations and writes the files."""
         parts = [self._scan(k + 1, st, ins) for k, st in enumerate(stations)]
         p = {k: np.concatenate([q[k] for q in parts]) for k in parts[0]}
@@ -564,8 +646,13 @@ class World:
         (folder / "stations.csv").write_text("scan_id,x,y,z\n" + "".join(rows))
         seen = p["surface"] > 0
         incidence = np.where(seen, np.degrees(np.arccos(np.clip(p["cos"], 0, 1))), np.nan)
-        np.savez_compressed(folder / "truth.npz", anomaly=p["flaw"].astype(np.int32), surface=p["surface"].astype(np.int32),
-                            incidence=incidence.astype(np.float32), area=p["area"].astype(np.float32))
+        np.savez_compressed(
+            folder / "truth.npz",
+            anomaly=p["flaw"].astype(np.int32),
+            surface=p["surface"].astype(np.int32),
+            incidence=incidence.astype(np.float32),
+            area=p["area"].astype(np.float32),
+        )
         listed = []
         for flaw in self.flaws:
             on = np.flatnonzero(p["flaw"] == flaw.number)
@@ -577,8 +664,12 @@ class World:
             _, place = np.unique(keys[:, :2], axis=0, return_inverse=True)
             most = np.zeros(place.max() + 1)
             np.maximum.at(most, place.ravel(), sums)
-            entry = {"id": flaw.number, "kind": flaw.kind, "area": round(float(most.sum()), 4),
-                     "contrast_db": round(float(p["delta"][on].mean()), 2)}
+            entry = {
+                "id": flaw.number,
+                "kind": flaw.kind,
+                "area": round(float(most.sum()), 4),
+                "contrast_db": round(float(p["delta"][on].mean()), 2),
+            }
             if flaw.limit:
                 entry["limit"] = flaw.limit
             listed.append(entry)

@@ -24,12 +24,16 @@ BLUE = Material(-4.2, 1.0, 1.8, 7.0, 0.15, 0.8)
 RED = Material(-2.6, 1.0, 1.6, 8.0, 0.15, 0.8)
 TAPE = Material(-0.6, 1.0, 0.8, 8.0, 0.1)
 
+
 def soot(mid: float, reach: float, seed: int, depth: float = 1.0):
     """A plume along a member: strongest in the middle, with a visible end."""
+
     def level(a: np.ndarray, b: np.ndarray) -> np.ndarray:
         x = np.abs(a - mid) / reach + 0.35 * noise(a, b, 0.35, seed, 3)
         return depth * np.clip((1.0 - x) / 0.35, 0, 1) ** 0.8
+
     return level
+
 
 def tray(w: World, p, q, width: float, seed: int, cables: int) -> None:
     """A cable ladder from p to q with cables that sag and cross a little."""
@@ -52,6 +56,7 @@ def tray(w: World, p, q, width: float, seed: int, cables: int) -> None:
         for s, t in zip(pts[:-1], pts[1:], strict=True):
             w.tube(s, t, r, black)
 
+
 def cable(w: World, p, q, sag: float, r: float) -> None:
     """A hanging cable."""
     s = w.surface(RUBBER, none=True)
@@ -61,16 +66,19 @@ def cable(w: World, p, q, sag: float, r: float) -> None:
     for a, b in zip(pts[:-1], pts[1:], strict=True):
         w.tube(a, b, r, s)
 
+
 def make(folder: Path) -> None:
     """Writes the hall."""
     w = World(202)
     long, wide, eave = 15.0, 11.0, 6.6
     w.patch((-0.5, -0.3, 0), (long + 1, 0, 0), (0, wide + 0.6, 0), FLOOR)
     w.patch((3.0, 1.6, 0.002), (9.0, 0, 0), (0, 0.1, 0), w.surface(YELLOW, none=True))  # lane marks: thin, design
+
     def courses(a: np.ndarray, b: np.ndarray) -> np.ndarray:
         i = np.floor(b / 0.083)
         joint = ((b % 0.083) < 0.011) | (((a + 0.13 * (i % 2)) % 0.26) < 0.011)
         return -0.7 * joint + np.where(b < 1.5, -1.8, 0.0)  # a painted dado
+
     back = w.patch((-0.5, wide + 0.25, 0), (long + 1, 0, 0), (0, 0, eave + 0.6), w.surface(BRICK, courses))
     w.flaw(back, "soot", blob(9.4, 4.6, 1.5, 2.4, 0.6, 12, 0.35, 1.0), change=-3.2)
     w.flaw(back, "efflorescence", blob(3.6, 3.2, 1.2, 0.8, 0.5, 13, 0.15), change=2.2)
@@ -134,8 +142,10 @@ def make(folder: Path) -> None:
     tray(w, (5.0, 0.8, 6.1), (5.0, wide - 0.8, 6.1), 0.2, 6, 4)
     for x in np.arange(1.2, long, 2.5):
         w.tube((x, wide - 1.45, 3.6), (x, wide - 1.45, eave + 0.5), 0.005, w.surface(ZINC, none=True), ref=(1, 0, 0))
+
     def bands(a: np.ndarray, b: np.ndarray) -> np.ndarray:
         return np.where((b % 3.0) < 0.25, 2.2, 0.0)
+
     w.tube((0.3, 4.2, 6.25), (long, 4.2, 6.25), 0.057, w.surface(RED, bands))
     cable(w, (0.5, 8.4, 5.4), (long - 1, 9.1, 5.2), 0.9, 0.011)
     cable(w, (0.5, 8.5, 5.5), (long - 1, 9.0, 5.4), 0.7, 0.008)
@@ -144,10 +154,13 @@ def make(folder: Path) -> None:
     w.box((7.6, wide - 0.1, 0.9), (0.8, 0, 0), (0, 0.3, 0), (0, 0, 1.1), GREY, "y1")  # a switch cabinet
     w.box((3.2, 8.2, 0), (1.2, 0, 0), (0, 0.8, 0), (0, 0, 0.9), YELLOW, "z0")  # a crate
     ins = Instrument(0.25, 0.0012, 0.4, 21.0, 2.2, 20.0, -20.0, False, 0.0)
-    stations = [Station((4.3, 3.3, 1.6), (28, 150), (-14, 52), 0.0, 0.115),
-                Station((10.6, 4.6, 1.62), (30, 152), (-14, 52), 2.6, 0.115),
-                Station((8.4, 7.4, 1.75), (-160, -20), (-12, 48), -1.7, 0.12)]
+    stations = [
+        Station((4.3, 3.3, 1.6), (28, 150), (-14, 52), 0.0, 0.115),
+        Station((10.6, 4.6, 1.62), (30, 152), (-14, 52), 2.6, 0.115),
+        Station((8.4, 7.4, 1.75), (-160, -20), (-12, 48), -1.7, 0.12),
+    ]
     w.write(folder, stations, ins, (371442.8, 5708215.9, 61.3), -23.5, 25832, "crane hall")
+
 
 def pipe_bridge(folder: Path) -> None:
     """Writes the pipe bridge: much design, no anomaly."""
@@ -160,8 +173,10 @@ def pipe_bridge(folder: Path) -> None:
             for dx in (-0.17, 0.17):
                 for dy in (-0.17, 0.17):
                     bolt(w, (x + dx, y + dy, 0.375), (0, 0, 1), ZINC)
+
             def hazard(a: np.ndarray, b: np.ndarray) -> np.ndarray:  # black and yellow up to 1.4 m: design
                 return np.where(b < 1.4, np.where((a + b) % 0.24 < 0.12, -3.2, 3.4), 0.0)
+
             o = np.array([x - 0.1, y - 0.1, 0.375])
             z = (0, 0, 4.6)
             for p, e in ((o, (0.2, 0, 0)), (o + (0, 0.2, 0), (0.2, 0, 0)), (o, (0, 0.2, 0)), (o + (0.2, 0, 0), (0, 0.2, 0))):
@@ -191,15 +206,21 @@ def pipe_bridge(folder: Path) -> None:
         w.box((x, 0.06, zl), (0.08, 0, 0), (0, 2.28, 0), (0, 0, 0.1), GREY, "y0 y1")
     # pipes: blue with bands, flow arrows and flanges; aluminium jacket with laps; white with a heat tape; a small red one
     rng = np.random.default_rng(5)
-    for y, r, m, ring, half, pitch in ((0.45, 0.162, BLUE, 2.4, 0.12, 3.5), (1.1, 0.25, ALU, 0.0, 0.0, 1.0),
-                                       (1.75, 0.11, TAPE, -2.6, 0.09, 2.6), (2.1, 0.057, RED, 2.0, 0.08, 2.0)):
+    for y, r, m, ring, half, pitch in (
+        (0.45, 0.162, BLUE, 2.4, 0.12, 3.5),
+        (1.1, 0.25, ALU, 0.0, 0.0, 1.0),
+        (1.75, 0.11, TAPE, -2.6, 0.09, 2.6),
+        (2.1, 0.057, RED, 2.0, 0.08, 2.0),
+    ):
         tones = rng.normal(0, 0.5, 40)
+
         def design(a, b, ring=ring, half=half, pitch=pitch, tones=tones, r=r):
             if not ring:  # sheets of the jacket, one tone each, a lap at each metre
                 return tones[np.floor(b).astype(int) % 40] - 1.5 * ((b % 1.0) < 0.015)
             band = ring * (np.abs(b % pitch - 0.8) < half)
             arrow = -0.9 * ring * ((np.abs(b % pitch - 1.35) < 0.22) & (np.abs(a) < 0.45 * r))
             return band + arrow
+
         z = zl + 0.1 + r + 0.06
         w.tube((-2.0, y, z), (20.0, y, z), r, w.surface(m, design), ref=(0, -1, -0.25))
         if m is not ALU:
@@ -229,6 +250,8 @@ def pipe_bridge(folder: Path) -> None:
     for x in np.arange(-1.4, 19.6, 1.75):
         w.tube((x, 2.4, zu + 0.12), (x, 2.4, zu + 1.1), 0.0212, YELLOW, ref=(0, 1, 0))
     ins = Instrument(0.3, 0.0015, 0.5, 26.0, 3.0, 20.0, -17.0, True)
-    stations = [Station((5.6, -7.6, 1.7), (30, 146), (-9, 45), 0.0, 0.05),
-                Station((13.4, -6.4, 1.66), (34, 150), (-9, 50), -1.2, 0.05)]
+    stations = [
+        Station((5.6, -7.6, 1.7), (30, 146), (-9, 45), 0.0, 0.05),
+        Station((13.4, -6.4, 1.66), (34, 150), (-9, 50), -1.2, 0.05),
+    ]
     w.write(folder, stations, ins, (297881.5, 5663048.1, 38.9), 112.0, 25832, "pipe bridge")

@@ -7,7 +7,18 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.blind_structures.round_02.engine import (
-    Instrument, Material, Station, World, _hash, blob, flakes, foot, noise, streak, strokes, unit,
+    Instrument,
+    Material,
+    Station,
+    World,
+    _hash,
+    blob,
+    flakes,
+    foot,
+    noise,
+    streak,
+    strokes,
+    unit,
 )
 from benchmarks.blind_structures.round_02.stairs import ASPHALT, CONCRETE, RUST, SIGN, ZINC, bolt
 
@@ -24,8 +35,10 @@ WEB = Material(-4.6, 1.0, 1.8, 7.0, 0.2, 0.7)
 WET = Material(-8.4, 1.0, 14.0, 4.0, 0.3, 0.25)
 PUDDLE = Material(-13.0, 1.0, 40.0, 2.0, 0.3, 0.2)
 
+
 def formwork(width: float, height: float, seed: int):
     """Panels of slightly unlike tone, their joints and the tie holes: design."""
+
     def tone(a: np.ndarray, b: np.ndarray) -> np.ndarray:
         i, j = np.floor(a / width), np.floor(b / height)
         t = 0.9 * (_hash(i, j, seed) - 0.5) + 0.4 * (_hash(i + 0 * j, 0 * j, seed + 1) - 0.5)
@@ -33,11 +46,14 @@ def formwork(width: float, height: float, seed: int):
         joint = (np.minimum(x, width - x) < 0.003) | (np.minimum(y, height - y) < 0.003)
         hole = np.hypot(np.abs(x - width / 2) - width / 4, np.abs(y - height / 2) - height / 4) < 0.013
         return t - 1.0 * joint - 4.0 * hole
+
     return tone
+
 
 def both(*levels):
     """Several places as one anomaly."""
     return lambda a, b: np.maximum.reduce([f(a, b) for f in levels])
+
 
 def leaves(w: World, centres: np.ndarray, normals: np.ndarray, sizes: np.ndarray, shades: list, rng) -> None:
     """Lobed blades, each with its own tilt."""
@@ -45,20 +61,25 @@ def leaves(w: World, centres: np.ndarray, normals: np.ndarray, sizes: np.ndarray
         n = unit(n)
         u = unit(np.cross(n, rng.normal(size=3)))
         v = np.cross(n, u)
+
         def mask(a: np.ndarray, b: np.ndarray, r: float = r) -> np.ndarray:
             x, y = a / r - 1, (b / r - 1) / 0.8
             return np.hypot(x, y) < 0.78 + 0.2 * np.cos(3 * np.arctan2(y, x))
+
         w.patch(c - r * u - r * v, 2 * r * u, 2 * r * v, shades[rng.integers(len(shades))], mask=mask)
+
 
 def wall(folder: Path) -> None:
     """Writes the wall."""
     w = World(203)
     rng = np.random.default_rng(33)
     w.patch((-3, -2.4, 0.0), (18, 0, 0), (0, 2.5, 0), w.surface(GRASS, none=True))
+
     def slabs(a: np.ndarray, b: np.ndarray) -> np.ndarray:
         i, j = np.floor(a / 0.5), np.floor(b / 0.5)
         gap = (np.minimum(a - i * 0.5, b - j * 0.5) < 0.006) * -1.5
         return gap + 0.8 * (_hash(i, j, 9) - 0.5)
+
     w.patch((-3, -8.5, -0.03), (18, 0, 0), (0, 6.1, 0), w.surface(PAVING, slabs))
     parts = []
     for k in range(4):  # sections between expansion joints, each second one set back
@@ -70,12 +91,18 @@ def wall(folder: Path) -> None:
         w.box((3.1 * k - 0.01, y - 0.05, 4.0), (3.09, 0, 0), (0, 0.45, 0), (0, 0, 0.12), PAVING)
         parts.append(s)
     a, b, c, d = parts
-    tag = [[(0.5, 1.0), (0.55, 2.1), (0.95, 2.15), (1.0, 1.65), (0.6, 1.55), (1.1, 0.95)],
-           [(1.3, 0.95), (1.35, 1.7), (1.75, 1.75), (1.8, 1.0), (1.3, 0.98)],
-           [(2.0, 1.75), (2.15, 0.95), (2.4, 1.5), (2.55, 0.95), (2.75, 1.9)], [(0.4, 0.75), (1.5, 0.66), (2.8, 0.8)]]
+    tag = [
+        [(0.5, 1.0), (0.55, 2.1), (0.95, 2.15), (1.0, 1.65), (0.6, 1.55), (1.1, 0.95)],
+        [(1.3, 0.95), (1.35, 1.7), (1.75, 1.75), (1.8, 1.0), (1.3, 0.98)],
+        [(2.0, 1.75), (2.15, 0.95), (2.4, 1.5), (2.55, 0.95), (2.75, 1.9)],
+        [(0.4, 0.75), (1.5, 0.66), (2.8, 0.8)],
+    ]
     w.flaw(a, "graffiti", strokes(tag, 0.062, 41), SPRAY)
-    tag = [[(0.5, 1.3), (0.9, 2.0), (1.3, 1.3), (0.7, 1.55)], [(1.5, 2.0), (1.5, 1.3), (1.95, 1.3)],
-           [(2.6, 2.0), (2.1, 1.95), (2.15, 1.65), (2.6, 1.6), (2.6, 1.28), (2.1, 1.3)]]
+    tag = [
+        [(0.5, 1.3), (0.9, 2.0), (1.3, 1.3), (0.7, 1.55)],
+        [(1.5, 2.0), (1.5, 1.3), (1.95, 1.3)],
+        [(2.6, 2.0), (2.1, 1.95), (2.15, 1.65), (2.6, 1.6), (2.6, 1.28), (2.1, 1.3)],
+    ]
     w.flaw(c, "graffiti", strokes(tag, 0.085, 42), SILVER)
     runs = [streak(x, 3.55 - 0.02 * k, 0.75 + 0.4 * (k % 3), 0.15, 50 + k) for k, x in enumerate((0.7, 0.85, 1.0, 1.15))]
     w.flaw(a, "stain", both(*runs), change=-2.6)
@@ -86,8 +113,13 @@ def wall(folder: Path) -> None:
     w.flaw(c, "patched paint", blob(1.5, 3.1, 0.62, 0.42, 0.06, 68, 0.03), change=1.6)
     w.flaw(d, "rust", both(*(streak(x, 3.7, 1.3, 0.2, 70 + k) for k, x in enumerate((0.3, 0.5, 0.66)))), change=-2.8)
     w.flaw(d, "stain", blob(0.55, 1.0, 0.4, 0.45, 0.5, 74), change=-2.0)
-    w.flaw(c, "crack", strokes([[(0.25, 0.9), (0.3, 1.5), (0.22, 2.2), (0.34, 3.0), (0.3, 3.9)]], 0.006, 75), change=-2.0,
-           limit="The crack is narrower than one beam and one step of the scan.")
+    w.flaw(
+        c,
+        "crack",
+        strokes([[(0.25, 0.9), (0.3, 1.5), (0.22, 2.2), (0.34, 3.0), (0.3, 3.9)]], 0.006, 75),
+        change=-2.0,
+        limit="The crack is narrower than one beam and one step of the scan.",
+    )
     # furniture: a down pipe with clamps, a sign, a lamp post, its cable
     w.tube((9.25, -0.07, -0.1), (9.25, -0.07, 4.0), 0.05, PLASTIC, ref=(0, -1, 0))
     for z in (0.6, 2.0, 3.4):
@@ -130,6 +162,7 @@ def wall(folder: Path) -> None:
     stations = [Station((5.6, -9.2, 1.74), (50, 132), (-12, 19), 0.0, 0.05)]
     w.write(folder, stations, ins, (688407.2, 5336120.6, 512.7), 64.0, 25832, "formwork wall")
 
+
 def footbridge(folder: Path) -> None:
     """Writes the footbridge."""
     w = World(204)
@@ -141,8 +174,10 @@ def footbridge(folder: Path) -> None:
     w.flaw(path, "moisture", blob(9.6, 3.0, 1.1, 0.45, 0.4, 13, 0.06), PUDDLE)
     w.mirror = (path, -0.9, "moisture")
     for k, x in enumerate((0.3, 13.7)):  # abutments, each with a bench and bearings
+
         def lifts(a: np.ndarray, b: np.ndarray) -> np.ndarray:
             return 0.4 * (_hash(np.floor(a / 1.25), np.floor(b / 1.2), 5) - 0.5) - 1.0 * ((b % 1.2) < 0.006)
+
         s = w.patch((x, -3, -0.9), (0, 6, 0), (0, 0, 4.35), w.surface(CONCRETE, lifts))
         w.flaw(s, "moisture", streak(1.7 + 2.2 * k, 4.35, 2.9, 0.75, 20 + k), change=-3.4)
         if k:
@@ -155,9 +190,11 @@ def footbridge(folder: Path) -> None:
         w.patch((x + (-0.6 if k == 0 else 0.6), -3, 3.45), (0, 6, 0), (0, 0, 1.2), CONCRETE)
         for y in (-1.5, 1.5):
             w.box((x - (0.35 if k == 0 else 0), y - 0.15, 3.45), (0.35, 0, 0), (0, 0.3, 0), (0, 0, 0.13), PLASTIC, "z0 z1")
+
     # deck plate, weld seams across (design), longitudinal flats, cross girders
     def seams(a: np.ndarray, b: np.ndarray) -> np.ndarray:
         return -0.9 * (np.abs(a - 5.05) < 0.008) - 0.9 * (np.abs(a - 9.9) < 0.008)
+
     deck = w.patch((-0.2, -1.5, zd), (length + 0.4, 0, 0), (0, 3.0, 0), w.surface(DECK, seams))
     w.flaw(deck, "moisture", blob(4.6, 1.4, 1.5, 0.62, 0.4, 31, 0.08), WET)
     w.flaw(deck, "moisture", blob(10.9, 2.1, 0.9, 0.5, 0.4, 32, 0.08), WET)
@@ -210,6 +247,8 @@ def footbridge(folder: Path) -> None:
     w.tube((-0.1, -0.5, zd - 0.385), (length, -0.45, zd - 0.39), 0.011, w.surface(PLASTIC, none=True))
     w.patch((3.0, -1.4935, 3.75), (0.4, 0, 0), (0, 0, 0.25), SIGN)
     ins = Instrument(0.3, 0.0015, 0.45, 23.0, 2.6, 20.0, -22.0, False, 1.2e-3)
-    stations = [Station((1.35, -0.95, 0.73), (-52, 60), (-31, 74), 0.0, 0.12),
-                Station((12.4, 0.25, 0.8), (122, 236), (-31, 74), 1.4, 0.12)]
+    stations = [
+        Station((1.35, -0.95, 0.73), (-52, 60), (-31, 74), 0.0, 0.12),
+        Station((12.4, 0.25, 0.8), (122, 236), (-31, 74), 1.4, 0.12),
+    ]
     w.write(folder, stations, ins, (452090.7, 5478811.3, 103.4), 151.0, 25832, "footbridge")

@@ -18,12 +18,14 @@ ASPHALT = Material(-8.5, 0.8, 0.0, 10.0, 0.4, 0.7, 0.5)
 SIGN = Material(-1.5, 1.0, 1.5, 8.0, 0.05)
 PAINT = Material(-3.2, 1.0, 2.0, 8.0, 0.15)
 
+
 def bolt(w: World, at, normal, material: Material) -> None:
     """A bolt head; too small to be a surface."""
     n = np.asarray(normal, float)
     s = w.surface(material, none=True)
     w.tube(at, np.asarray(at) + 0.014 * n, 0.013, s)
     w.disc(np.asarray(at) + 0.014 * n, n, 0.013, s)
+
 
 def column(w: World, x: float, y: float, top: float, rust: float, seed: int) -> dict:
     """A hollow section on a foot plate and a plinth, with rust that rises from the foot on the faces one can see."""
@@ -38,6 +40,7 @@ def column(w: World, x: float, y: float, top: float, rust: float, seed: int) -> 
             h = rust * (0.75, 1.0, 1.15, 0.85)[(k + seed) % 4]
             w.flaw(faces[name], "rust", foot(h, 0.05 + 0.12 * h, seed * 10 + k), RUST)
     return {"faces": faces, "plinth": plinth}
+
 
 def grating(w: World, o, ex, ey, pitch: float, rods: float, edges: bool) -> None:
     """Bearing bars along ex, 30 mm high and a few millimetres thick, and cross rods along ey. A mesh: no surface."""
@@ -54,6 +57,7 @@ def grating(w: World, o, ex, ey, pitch: float, rods: float, edges: bool) -> None
         q = o + ex * d / length + (0, 0, 0.027)
         w.tube(q, q + ey, 0.003, s)
 
+
 def rail(w: World, p, q, posts: int) -> None:
     """Hand rail, knee rail and posts between two points at floor level."""
     p, q = np.asarray(p, float), np.asarray(q, float)
@@ -64,12 +68,15 @@ def rail(w: World, p, q, posts: int) -> None:
         r = p + f * (q - p)
         w.tube(r - 0.1 * up, r + 0.98 * up, 0.0212, ZINC, ref=(1, 0, 0))
 
+
 def make(folder: Path) -> None:
     """Writes the stair tower."""
     w = World(201)
     w.patch((-9, -9, 0), (20, 0, 0), (0, 14.6, 0), ASPHALT)
+
     def bays(a: np.ndarray, b: np.ndarray) -> np.ndarray:  # the facade was rendered in three lifts: design
         return np.where(b < 3.4, 0.0, np.where(b < 6.7, 0.35, -0.25)) - 2.5 * (np.abs(b % 3.3 - 0.1) < 0.008)
+
     wall = w.patch((-3.4, 5.6, 0), (9, 0, 0), (0, 0, 10.5), w.surface(RENDER, bays))
     w.flaw(wall, "moisture", foot(0.65, 0.3, 31, soft=0.15), change=-2.4)
     w.flaw(wall, "stain", streak(6.9, 8.9, 4.4, 0.9, 32), change=-2.0)
@@ -113,8 +120,12 @@ def make(folder: Path) -> None:
                         w.flaw(face, "white rust", flakes(a0, 0.1, ra, 0.16, 0.12, 70 + flight, 0.3), WHITE_RUST)
                     if flight in (1, 2):
                         w.flaw(face, "rust", blob(0.35 + flight, 0.05, 0.3, 0.13, 0.5, 80 + flight), RUST)
-                    w.patch(np.array([x + (-0.0015 if half == 0 else 0.0095), y0 + sign * 1.4, z + 0.62]),
-                            0.18 * lean * flip / np.linalg.norm(lean), 0.07 * perp * flip, SIGN)
+                    w.patch(
+                        np.array([x + (-0.0015 if half == 0 else 0.0095), y0 + sign * 1.4, z + 0.62]),
+                        0.18 * lean * flip / np.linalg.norm(lean),
+                        0.07 * perp * flip,
+                        SIGN,
+                    )
                 xr = x + 0.004
                 rail(w, (xr, y0, z + 0.1), (xr, y0 + sign * run, z + rise + 0.1), 4)
             for k in range(1, n):
@@ -141,6 +152,8 @@ def make(folder: Path) -> None:
         w.tube((-0.09, 0.02 + d, 0.4), (-0.09, 0.03 + d, 9.4), 0.009, lamp, ref=(1, 0, 0))
     w.box((1.1, 5.4, 2.5), (0.25, 0, 0), (0, 0.16, 0), (0, 0, 0.12), PAINT)
     ins = Instrument(0.35, 0.0018, 0.45, 24.0, 3.2, 20.0, -17.0)
-    stations = [Station((0.9, -6.3, 1.72), (62, 115), (-14, 56), 0.0, 0.066),
-                Station((6.9, -2.4, 1.68), (98, 172), (-14, 57), 0.9, 0.066)]
+    stations = [
+        Station((0.9, -6.3, 1.72), (62, 115), (-14, 56), 0.0, 0.066),
+        Station((6.9, -2.4, 1.68), (98, 172), (-14, 57), 0.9, 0.066),
+    ]
     w.write(folder, stations, ins, (564218.4, 5931877.2, 14.6), 37.0, 25832, "stair tower")

@@ -15,14 +15,29 @@ from benchmarks.blind_structures.scene import Scene
 from . import machine, pier, portal, silos, truss
 
 SCENES = (
-    Scene("truss-bridge", "Truss railway bridge of box and U sections: old paint, repairs, rust at nodes; fence and plants.",
-          truss.make),
-    Scene("silo-group", "Three silos: painted steel, corrugated sheet, concrete; dark runs under outlets, ladders with cages.",
-          silos.make),
-    Scene("portal-wall", "Head wall of a tunnel portal in stone: joints, damp at the foot, efflorescence, steel door, pipe.",
-          portal.make),
-    Scene("machine-room", "Motor with ribs, pump casing, base frame, pipes with flanges; oil stains and rust, three stations.",
-          machine.make),
-    Scene("inclined-pier", "Steel pier with inclined legs, bearings, drain pipe; rust streaks along legs, strong incidence.",
-          pier.make),
+    Scene(
+        "truss-bridge",
+        "Truss railway bridge of box and U sections: old paint, repairs, rust at nodes; fence and plants.",
+        truss.make,
+    ),
+    Scene(
+        "silo-group",
+        "Three silos: painted steel, corrugated sheet, concrete; dark runs under outlets, ladders with cages.",
+        silos.make,
+    ),
+    Scene(
+        "portal-wall",
+        "Head wall of a tunnel portal in stone: joints, damp at the foot, efflorescence, steel door, pipe.",
+        portal.make,
+    ),
+    Scene(
+        "machine-room",
+        "Motor with ribs, pump casing, base frame, pipes with flanges; oil stains and rust, three stations.",
+        machine.make,
+    ),
+    Scene(
+        "inclined-pier",
+        "Steel pier with inclined legs, bearings, drain pipe; rust streaks along legs, strong incidence.",
+        pier.make,
+    ),
 )

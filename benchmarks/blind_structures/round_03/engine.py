@@ -20,6 +20,7 @@ Shape = Callable[[Array, Array], Array]
 
 # ---------------------------------------------------------------- random fields and shapes of marks
 
+
 class Noise:
     """A smooth periodic random field with unit variance, looked up bilinearly; `scale` is its grain in metres."""
 
@@ -53,8 +54,9 @@ def blob(u0: float, v0: float, ru: float, rv: float, seed: int, rough: float = 0
     return alpha
 
 
-def run(u0: float, v0: float, length: float, width: float, seed: int, down: float = -1.0, taper: float = 0.5,
-        wander: float = 0.25) -> Shape:
+def run(
+    u0: float, v0: float, length: float, width: float, seed: int, down: float = -1.0, taper: float = 0.5, wander: float = 0.25
+) -> Shape:
     """A run of liquid from (u0, v0) along v; it wanders, tapers and frays out at its end."""
     w1, w2 = Noise(seed, 0.8), Noise(seed + 1, 0.25)
 
@@ -100,6 +102,7 @@ def speckle(shape: Shape, seed: int, scale: float, cover: float = 0.0) -> Shape:
 
 
 # ---------------------------------------------------------------- materials and surfaces
+
 
 @dataclass(frozen=True)
 class Material:
@@ -158,8 +161,9 @@ class Surface:
 class Quad(Surface):
     """A rectangle: v runs from the start `o` along ev, u across it from -lu/2 to lu/2, n is the outward normal."""
 
-    def __init__(self, o: Iterable[float], n: Iterable[float], ev: Iterable[float], lu: float, lv: float,
-                 mat: Material) -> None:
+    def __init__(
+        self, o: Iterable[float], n: Iterable[float], ev: Iterable[float], lu: float, lv: float, mat: Material
+    ) -> None:
         super().__init__(mat)
         self.o, self.n = np.array(o, float), unit(n)
         self.ev = unit(np.array(ev, float) - np.dot(ev, self.n) * self.n)
@@ -194,8 +198,17 @@ class Quad(Surface):
 class Cylinder(Surface):
     """The outside (or inside) of a cylinder: u is the arc from `ref`, v runs along the axis; it may be corrugated."""
 
-    def __init__(self, p0: Iterable[float], p1: Iterable[float], r: float, mat: Material, ref: Iterable[float] = (0, -1, 0),
-                 inside: bool = False, wave: float = 0.0, pitch: float = 0.1) -> None:
+    def __init__(
+        self,
+        p0: Iterable[float],
+        p1: Iterable[float],
+        r: float,
+        mat: Material,
+        ref: Iterable[float] = (0, -1, 0),
+        inside: bool = False,
+        wave: float = 0.0,
+        pitch: float = 0.1,
+    ) -> None:
         super().__init__(mat)
         self.p0, a = np.array(p0, float), np.array(p1, float) - np.array(p0, float)
         self.lv, self.ax, self.r = float(np.linalg.norm(a)), unit(a), r
@@ -288,8 +301,16 @@ class World:
     def cyl(self, *a, smooth: bool = True, **k) -> Cylinder:
         return self.add(Cylinder(*a, **k), smooth)
 
-    def box(self, p0: Iterable[float], p1: Iterable[float], width: float, height: float, mat: Material,
-            up: Iterable[float] = (0, 0, 1), caps: bool = True) -> dict[str, Quad]:
+    def box(
+        self,
+        p0: Iterable[float],
+        p1: Iterable[float],
+        width: float,
+        height: float,
+        mat: Material,
+        up: Iterable[float] = (0, 0, 1),
+        caps: bool = True,
+    ) -> dict[str, Quad]:
         """A bar from p0 to p1 with faces "+2", "-2" (sides), "+3", "-3" (top, bottom) and the caps "+1", "-1"."""
         p0, p1 = np.array(p0, float), np.array(p1, float)
         e1 = unit(p1 - p0)
@@ -305,8 +326,17 @@ class World:
                 f[f"{k:+d}"] = self.quad((p1 if k > 0 else p0) - height / 2 * e3, k * e1, e3, width, height, mat)
         return f
 
-    def channel(self, p0: Iterable[float], p1: Iterable[float], h: float, b: float, t: float, mat: Material,
-                side: Iterable[float], caps: bool = True) -> dict[str, dict[str, Quad]]:
+    def channel(
+        self,
+        p0: Iterable[float],
+        p1: Iterable[float],
+        h: float,
+        b: float,
+        t: float,
+        mat: Material,
+        side: Iterable[float],
+        caps: bool = True,
+    ) -> dict[str, dict[str, Quad]]:
         """A U section: web in the plane across `side`, flanges towards `side`; the key "web" has its back at "-2"."""
         p0, p1 = np.array(p0, float), np.array(p1, float)
         e1 = unit(p1 - p0)
@@ -327,8 +357,15 @@ class World:
         q.mask = lambda u, v: (np.hypot(u, v - r) <= r) & (np.hypot(u, v - r) >= r0)
         return q
 
-    def leaves(self, n: int, draw: Callable[[np.random.Generator], Array], size: tuple[float, float], mat: Material,
-               slender: float = 0.55, upright: bool = False) -> None:
+    def leaves(
+        self,
+        n: int,
+        draw: Callable[[np.random.Generator], Array],
+        size: tuple[float, float],
+        mat: Material,
+        slender: float = 0.55,
+        upright: bool = False,
+    ) -> None:
         """Leaves, or blades where upright, at places that `draw` gives."""
         for _ in range(n):
             p, s = draw(self.rng), self.rng.uniform(*size)
@@ -345,6 +382,7 @@ class World:
 
 
 # ---------------------------------------------------------------- the scanner
+
 
 @dataclass
 class Scanner:
@@ -443,7 +481,7 @@ def scan(world: World, view: View, tool: Scanner, number: int, rng: np.random.Ge
     rad = math.degrees(tool.beam * 1e-3) * 0.36
     drift = tool.drift * Noise(number + 91, 60.0)(az, 0 * az)
     for c0 in range(0, len(az), cols):
-        a = az[c0:c0 + cols]
+        a = az[c0 : c0 + cols]
         ee, aa = np.meshgrid(el, a)  # columns first, as the scanner turns
         e_k = np.stack([ee + rad * q for _, q in SUB])
         a_k = np.stack([aa + rad * p / np.maximum(np.cos(np.radians(ee)), 0.05) for p, _ in SUB])
@@ -470,14 +508,26 @@ def scan(world: World, view: View, tool: Scanner, number: int, rng: np.random.Ge
         _beams(world, view, tool, number, rng, out, s, t, pid, d, el_c, drift[col])
 
 
-def _beams(world: World, view: View, tool: Scanner, number: int, rng: np.random.Generator, out: Rows, s: Array, t: Array,
-           pid: Array, d: Array, el: Array, drift: Array) -> None:
+def _beams(
+    world: World,
+    view: View,
+    tool: Scanner,
+    number: int,
+    rng: np.random.Generator,
+    out: Rows,
+    s: Array,
+    t: Array,
+    pid: Array,
+    d: Array,
+    el: Array,
+    drift: Array,
+) -> None:
     k, n = t.shape
     flat_t, flat_p, flat_d = t.ravel(), pid.ravel(), d.reshape(-1, 3)
     val = {key: np.zeros(k * n) for key in ("cos", "f", "base", "u", "v", "lift")}
     ident, stud = np.zeros(k * n, np.int32), np.zeros(k * n, bool)
     order = np.argsort(flat_p, kind="stable")
-    order = order[np.searchsorted(flat_p[order], 0):]
+    order = order[np.searchsorted(flat_p[order], 0) :]
     cut = np.flatnonzero(np.diff(flat_p[order])) + 1
     for idx in np.split(order, cut):
         if len(idx) == 0:
@@ -493,7 +543,7 @@ def _beams(world: World, view: View, tool: Scanner, number: int, rng: np.random.
     t = np.where(np.isfinite(t), t - val["lift"] / np.maximum(val["cos"], 0.25), 1e6)
     hit = pid >= 0
     w = np.where(hit, WEIGHT[:, None], 0.0)
-    e = w * val["f"] / t ** 2
+    e = w * val["f"] / t**2
     # one echo: the strongest group of returns that the receiver cannot separate
     group_e = np.zeros((k, n))
     same_e = np.zeros((k, n))
@@ -516,7 +566,7 @@ def _beams(world: World, view: View, tool: Scanner, number: int, rng: np.random.
     amp = tool.const + view.offset + tool.far(reach) + 10 * np.log10(np.maximum(power, 1e-9)) + drift
     weak = np.clip(10 ** (0.05 * (18 - amp)), 0.9, 1.6)
     amp = amp + tool.noise * np.clip(weak, 0.9, 1.4) * rng.standard_normal(n)
-    spread = np.minimum(reach * tool.beam * 1e-3 * 0.12 * np.sqrt(1 - cos ** 2) / np.maximum(cos, 0.15), 0.002)
+    spread = np.minimum(reach * tool.beam * 1e-3 * 0.12 * np.sqrt(1 - cos**2) / np.maximum(cos, 0.15), 0.002)
     r = reach + np.hypot(tool.sigma * np.clip(weak, 0.9, 1.3), spread) * rng.standard_normal(n)
     # false returns: dust and rain in front, echoes behind
     wrong = rng.random(n) < tool.false
@@ -527,15 +577,20 @@ def _beams(world: World, view: View, tool: Scanner, number: int, rng: np.random.
     surf = np.where(mixed | wrong | stud[lead, cols], 0, sids[pid[lead, cols]])
     ids = np.where(surf > 0, ident[lead, cols], 0)
     inc = np.degrees(np.arccos(np.clip(cos, 0, 1)))
-    area = reach ** 2 * math.radians(view.step) ** 2 * np.cos(np.radians(el)) / np.maximum(cos, 0.03)
+    area = reach**2 * math.radians(view.step) ** 2 * np.cos(np.radians(el)) / np.maximum(cos, 0.03)
     xyz = s + r[:, None] * d[0]
-    rows = dict(xyz=xyz[keep], amp=np.round(amp, 2)[keep].astype(np.float32),
-                station=np.full(int(keep.sum()), number, np.uint16),
-                surface=surf[keep].astype(np.int32), anomaly=ids[keep].astype(np.int32),
-                incidence=np.where(surf > 0, inc, np.nan)[keep].astype(np.float32),
-                area=np.where(surf > 0, area, 0)[keep].astype(np.float32),
-                contrast=(10 * np.log10(np.maximum(contrast, 1e-6)))[keep],
-                u=val["u"][lead, cols][keep], v=val["v"][lead, cols][keep])
+    rows = dict(
+        xyz=xyz[keep],
+        amp=np.round(amp, 2)[keep].astype(np.float32),
+        station=np.full(int(keep.sum()), number, np.uint16),
+        surface=surf[keep].astype(np.int32),
+        anomaly=ids[keep].astype(np.int32),
+        incidence=np.where(surf > 0, inc, np.nan)[keep].astype(np.float32),
+        area=np.where(surf > 0, area, 0)[keep].astype(np.float32),
+        contrast=(10 * np.log10(np.maximum(contrast, 1e-6)))[keep],
+        u=val["u"][lead, cols][keep],
+        v=val["v"][lead, cols][keep],
+    )
     for key, a in rows.items():
         out.setdefault(key, []).append(a)
 
@@ -554,8 +609,16 @@ def visible(ids: Array, station: Array, u: Array, v: Array, area: Array, cell: f
     return {int(i): float(top[spots[:, 0] == i].sum()) for i in np.unique(spots[:, 0])}
 
 
-def deliver(folder: Path, world: World, views: list[View], tool: Scanner, seed: int, epsg: int,
-            origin: tuple[float, float, float], yaw: float) -> None:
+def deliver(
+    folder: Path,
+    world: World,
+    views: list[View],
+    tool: Scanner,
+    seed: int,
+    epsg: int,
+    origin: tuple[float, float, float],
+    yaw: float,
+) -> None:
     """Scan all stations and write the four files."""
     rng, out = np.random.default_rng(seed), {}
     for i, view in enumerate(views, 1):
@@ -582,16 +645,21 @@ def deliver(folder: Path, world: World, views: list[View], tool: Scanner, seed: 
         p = turn @ np.array(view.at) + np.array(origin)
         rows.append(f"{i},{p[0]:.4f},{p[1]:.4f},{p[2]:.4f}")
     (Path(folder) / "stations.csv").write_text("\n".join(rows) + "\n")
-    np.savez_compressed(Path(folder) / "truth.npz", anomaly=a["anomaly"], surface=a["surface"], incidence=a["incidence"],
-                        area=a["area"])
+    np.savez_compressed(
+        Path(folder) / "truth.npz", anomaly=a["anomaly"], surface=a["surface"], incidence=a["incidence"], area=a["area"]
+    )
     size = visible(a["anomaly"], a["station"], a["u"], a["v"], a["area"])
     listed = []
     for m in world.marks:
         on = a["anomaly"] == m.ident
         if not on.any():
             continue
-        row = {"id": m.ident, "kind": m.kind, "area": round(size[m.ident], 4),
-               "contrast_db": round(float(a["contrast"][on].mean()), 2)}
+        row = {
+            "id": m.ident,
+            "kind": m.kind,
+            "area": round(size[m.ident], 4),
+            "contrast_db": round(float(a["contrast"][on].mean()), 2),
+        }
         if m.limit:
             row["limit"] = m.limit
         listed.append(row)

@@ -34,10 +34,12 @@ def build() -> World:
             slabs[i, j] = q
     under = w.quad((0, -4.5, -0.012), up, (0, 1, 0), 11, 9, Material(0.2, tex=0.5), smooth=False)
     under.big = True
-    walls = {"back": w.quad((0, 4.2, 0), (0, -1, 0), up, 10.8, 4.0, WALLS),
-             "front": w.quad((0, -4.2, 0), (0, 1, 0), up, 10.8, 4.0, WALLS),
-             "left": w.quad((-5.4, 0, 0), (1, 0, 0), up, 8.4, 4.0, WALLS),
-             "right": w.quad((5.4, 0, 0), (-1, 0, 0), up, 8.4, 4.0, WALLS)}
+    walls = {
+        "back": w.quad((0, 4.2, 0), (0, -1, 0), up, 10.8, 4.0, WALLS),
+        "front": w.quad((0, -4.2, 0), (0, 1, 0), up, 10.8, 4.0, WALLS),
+        "left": w.quad((-5.4, 0, 0), (1, 0, 0), up, 8.4, 4.0, WALLS),
+        "right": w.quad((5.4, 0, 0), (-1, 0, 0), up, 8.4, 4.0, WALLS),
+    }
     for q in walls.values():
         q.big = True
     walls["back"].design(lambda u, v: 1.0 * ((v < 1.4) & (np.abs((v % 0.15) - 0.075) < 0.072)), TILE)
@@ -148,6 +150,9 @@ def build() -> World:
 def make(folder: Path) -> None:
     """Three stations, 3 mm of range noise."""
     tool = Scanner(beam=0.4, sigma=0.003, noise=0.7, const=27.0, near=1.8, floor=2.0, wiggle=0.2, false=0.0015, split=1.2)
-    views = [View((-2.9, -3.4, 1.7), (20, 110), (-38, 24), 0.12), View((4.4, -3.1, 1.62), (92, 182), (-38, 24), 0.12, 0.2),
-             View((0.4, 3.75, 1.75), (-138, -42), (-40, 20), 0.12, -0.3)]
+    views = [
+        View((-2.9, -3.4, 1.7), (20, 110), (-38, 24), 0.12),
+        View((4.4, -3.1, 1.62), (92, 182), (-38, 24), 0.12, 0.2),
+        View((0.4, 3.75, 1.75), (-138, -42), (-40, 20), 0.12, -0.3),
+    ]
     deliver(folder, build(), views, tool, 34, 2154, (652871.5, 6861420.3, 31.2), 17.0)

@@ -29,8 +29,11 @@ def fence(w: World, x0: float, x1: float, y: float, top: float) -> None:
 
     def mesh(u: Array, v: Array) -> Array:
         a, b = (u + v) / math.sqrt(2), (u - v) / math.sqrt(2)
-        return (np.abs((a / pitch) % 1 - 0.5) * pitch > (pitch - wire) / 2) | (
-            np.abs((b / pitch) % 1 - 0.5) * pitch > (pitch - wire) / 2) | (v > top - 0.055)
+        return (
+            (np.abs((a / pitch) % 1 - 0.5) * pitch > (pitch - wire) / 2)
+            | (np.abs((b / pitch) % 1 - 0.5) * pitch > (pitch - wire) / 2)
+            | (v > top - 0.055)
+        )
 
     q.mask = mesh
     w.add(q, False)
@@ -72,8 +75,15 @@ def studs_along(u: list[float], v: Array, r: float = 0.014, h: float = 0.011) ->
     return np.array([(a, b, r, h) for a in u for b in v])
 
 
-def flange(w: World, c: tuple[float, float, float], axis: tuple[float, float, float], r: float, mat: Material,
-           thick: float = 0.06, ref: tuple[float, float, float] = (0, -1, 0)):
+def flange(
+    w: World,
+    c: tuple[float, float, float],
+    axis: tuple[float, float, float],
+    r: float,
+    mat: Material,
+    thick: float = 0.06,
+    ref: tuple[float, float, float] = (0, -1, 0),
+):
     """A pair of flanges as one short drum with bolts on its faces; gives the rim and the two rings."""
     a, c = np.array(axis, float), np.array(c, float)
     rim = w.cyl(c - thick / 2 * a, c + thick / 2 * a, 1.42 * r, mat, ref=ref)

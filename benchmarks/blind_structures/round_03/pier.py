@@ -25,8 +25,9 @@ def build() -> World:
         for j in (-1, 1):
             a, b = np.array([2.3 * i, 1.7 * j, foot]), np.array([1.15 * i, 0.55 * j, head])
             f = w.box(a, b, 0.55, 0.62, PAINT, (i, 0, 0), caps=False)
-            legs[i, j] = {"out" if k == "+3" else "in" if k == "-3" else "front" if q.n[1] < 0 else "back": q
-                          for k, q in f.items()}
+            legs[i, j] = {
+                "out" if k == "+3" else "in" if k == "-3" else "front" if q.n[1] < 0 else "back": q for k, q in f.items()
+            }
             for q in legs[i, j].values():
                 for v in (1.9, 3.9):
                     q.design(lambda u, s, v=v: 1.0 * (np.abs(s - v) < 0.009), -1.4)  # shop welds

@@ -20,8 +20,15 @@ MOSS = Material(0.24, 0.8, tex=0.8, grain=0.05)
 class Masonry:
     """Courses of stones with recessed joints: relief in metres and gain in dB over u, v."""
 
-    def __init__(self, seed: int, course: tuple[float, float], stone: tuple[float, float], relief: float, tone: float,
-                 joint: float = 0.018) -> None:
+    def __init__(
+        self,
+        seed: int,
+        course: tuple[float, float],
+        stone: tuple[float, float],
+        relief: float,
+        tone: float,
+        joint: float = 0.018,
+    ) -> None:
         rng = np.random.default_rng(seed)
         self.edges = np.cumsum(np.r_[0.0, rng.uniform(*course, 60)])
         self.width, self.start = rng.uniform(*stone, 61), rng.uniform(0, 1, 61)

@@ -65,10 +65,16 @@ def build() -> World:
     posts[True, 3]["-3"].design(patch(0, 0.7, 0.3, 0.25, 5), Material(0.7, 0.8, 0.9, 16.0, tex=0.1))
 
     # rust at the nodes
-    for k, (key, i, u, v, ru, rv, mat) in enumerate((
-            ("low", 1, 0.1, 0.15, 0.38, 0.22, RUST), ("low", 2, -0.2, 0.2, 0.24, 0.2, RUST_LIGHT),
-            ("low", 3, 0.0, 0.32, 0.33, 0.26, RUST), ("top", 1, 0.2, 0.25, 0.22, 0.26, RUST),
-            ("top", 3, -0.15, 0.5, 0.3, 0.2, RUST_LIGHT), ("low", 4, -0.3, 0.2, 0.25, 0.2, RUST))):
+    for k, (key, i, u, v, ru, rv, mat) in enumerate(
+        (
+            ("low", 1, 0.1, 0.15, 0.38, 0.22, RUST),
+            ("low", 2, -0.2, 0.2, 0.24, 0.2, RUST_LIGHT),
+            ("low", 3, 0.0, 0.32, 0.33, 0.26, RUST),
+            ("top", 1, 0.2, 0.25, 0.22, 0.26, RUST),
+            ("top", 3, -0.15, 0.5, 0.3, 0.2, RUST_LIGHT),
+            ("low", 4, -0.3, 0.2, 0.25, 0.2, RUST),
+        )
+    ):
         shape = blob(u, v, ru, rv, 400 + 10 * k, 0.35)
         w.anomaly(plates[True, key, i], "rust", speckle(shape, 900 + k, 0.05, 1.0) if k % 2 else shape, mat)
     for k, i in enumerate((0, 1, 3)):
@@ -83,13 +89,20 @@ def build() -> World:
     w.anomaly(diagonals[True, 1]["web"]["-2"], "patched paint", patch(-0.02, 3.2, 0.24, 0.5, 603, -3), OTHER)
     w.anomaly(chords[True, "low", 2]["web"]["-2"], "patched paint", patch(0.05, 2.0, 0.26, 0.8, 605, 1), FRESH)
     w.anomaly(chords[True, "top", 1]["-2"], "primer", patch(-0.03, 2.3, 0.28, 0.9, 607, -1), PRIMER)
-    w.anomaly(chords[True, "top", 2]["-2"], "peeled paint",
-              speckle(blob(0.02, 1.7, 0.16, 0.6, 609, 0.4), 611, 0.09, 0.6), PRIMER)
-    w.anomaly(diagonals[True, 3]["web"]["-2"], "peeled paint",
-              speckle(blob(0.0, 2.6, 0.13, 0.5, 613, 0.4), 615, 0.08, 0.7), RUST)
+    w.anomaly(
+        chords[True, "top", 2]["-2"], "peeled paint", speckle(blob(0.02, 1.7, 0.16, 0.6, 609, 0.4), 611, 0.09, 0.6), PRIMER
+    )
+    w.anomaly(
+        diagonals[True, 3]["web"]["-2"], "peeled paint", speckle(blob(0.0, 2.6, 0.13, 0.5, 613, 0.4), 615, 0.08, 0.7), RUST
+    )
     w.anomaly(diagonals[False, 1]["web"]["+2"], "rust", blob(0.0, 3.4, 0.12, 0.5, 617), RUST)
-    w.anomaly(chords[True, "low", 3]["web"]["-2"], "soiling", blob(0.0, 2.6, 0.17, 0.5, 619, soft=0.4), -0.45,
-              "a film of dust of less than half a decibel, weaker than the texture of the paint")
+    w.anomaly(
+        chords[True, "low", 3]["web"]["-2"],
+        "soiling",
+        blob(0.0, 2.6, 0.17, 0.5, 619, soft=0.4),
+        -0.45,
+        "a film of dust of less than half a decibel, weaker than the texture of the paint",
+    )
 
     fence(w, -9.5, 9.5, -3.2, 2.05)
     for x, y, h, m in ((-5.2, -2.4, 2.3, 650), (1.3, -2.2, 1.9, 520), (5.9, -2.6, 2.9, 760)):
