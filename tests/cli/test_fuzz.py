@@ -52,7 +52,7 @@ def _commands() -> dict[str, click.Command]:
     return verbs
 
 
-WRITTEN = {"-o", "--output", "--report", "--picture", "--axis-out", "--images"}
+WRITTEN = {"-o", "--output", "--report", "--picture", "--pictures", "--axis-out", "--images"}
 TEXTS_OF_FILES = {("tunnel add", "--axis"), ("survey set", "--reference"), ("members", ""), ("profile add", "")}
 """Values that may be a file, or else a word."""
 
