@@ -17,6 +17,7 @@ from tunneldb.registration.underwater.observations import (
     nearer_by_slant,
 )
 from tunneldb.registration.underwater.walls import find_walls
+from tunneldb.registration.underwater.water_surface import Level
 
 DEPTH = 2.0  # m of the bed below the water
 SCANNER = 1.2  # m of the scanner below it
@@ -104,8 +105,8 @@ def test_a_scan_is_fitted_beside_one_that_stays() -> None:
     steps = np.mgrid[-15.0:20.0:0.05, -0.6:1.5:0.05].reshape(2, -1).T
     sides = [np.column_stack([steps[:, 0], np.full(len(steps), side), steps[:, 1]]) for side in (-3.0, 3.0)]
     walls = find_walls(np.concatenate(sides) + rng.normal(0.0, 0.002, (2 * len(steps), 3)))
-    nothing = np.zeros((0, 3))
-    scans = [Scan(one, one, one, nothing, first, {}), Scan(other, other, other, nothing, moved(second, 0.15), {})]
+    level = Level(np.zeros((0, 3)), 0.005)
+    scans = [Scan(one, one, one, level, first, {}), Scan(other, other, other, level, moved(second, 0.15), {})]
     fitted = fit(scans, walls, (), [(0, 1)], (0.3, 0.2, 0.1, 0.1, 0.1, 0.1), fixed=1, hold_height=True)
     np.testing.assert_array_equal(fitted.poses[0].translation, first.translation)
     assert fitted.poses[1].translation[2] == second.translation[2]

@@ -28,9 +28,10 @@ from tunneldb.registration.underwater.observations import (
     waterline_rows,
 )
 from tunneldb.registration.underwater.walls import Walls
+from tunneldb.registration.underwater.water_surface import Level
 
 SCALE_SIGMA = 0.01  # prior standard deviation of the range scale: 15 m/s of 1480
-BATTER_SIGMA = 0.01  # prior standard deviation of the change of batter at the water
+BATTER_SIGMA = 0.05  # prior standard deviation of the change of batter at the water
 # Share of a bar's radius between its near surface and the origin of its echo: the mean of Lambert's law over a round bar,
 # 1 - (4/3) / (pi/2); and its uncertainty under other laws.
 DEPTH_SHARE, DEPTH_SPREAD = 1.0 - (4.0 / 3.0) / (np.pi / 2.0), 0.2
@@ -68,8 +69,8 @@ class Scan:
         Patches for the comparison with walls, and with other scans.
     columns : Patches
         Columns of upright walls, for the comparison with the plan of the walls.
-    level : (k, 3) float64 array
-        Points at the water's level, file's axes: its surface from below, or the upper edges of the walls.
+    level : Level
+        Points at the water's level: its surface from below, or the upper edges of the walls.
     pose : Pose
     ladders : mapping of int to (n, 3) float64 array
         Points around each ladder that it sees, file's axes.
@@ -78,7 +79,7 @@ class Scan:
     patches: Patches
     smooth: Patches
     columns: Patches
-    level: Float
+    level: Level
     pose: Pose
     ladders: Mapping[int, Float]
 
@@ -88,7 +89,7 @@ def scan_of(
     patches: Patches,
     smooth: Patches,
     columns: Patches,
-    level: Float,
+    level: Level,
     pose: Pose,
     ladders: Iterable[int],
     found: Sequence[LaserLadder],
@@ -227,7 +228,7 @@ def _all_rows(
         for k, points in scan.ladders.items():
             found = ladder_rows(points, poses[i], placed[k], float(common[2]), i, (first + 2, first + COMMON + 6 * k), reach)
             rows += [found] if found is not None else []
-        found = profile_rows(scan.columns, poses[i], walls, i, reach)
+        found = profile_rows(scan.columns, poses[i], walls, i, first + np.arange(2), reach)
         rows += [found] if found is not None else []
         found = waterline_rows(scan.level, poses[i], float(common[3]), i, first + 3, firm=not scan.ladders)
         rows += [found] if found is not None else []

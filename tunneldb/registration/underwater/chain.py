@@ -169,7 +169,7 @@ def _fitted_to_neighbours(own: Scan, others: Sequence[Scan], walls: Walls, direc
 
 def _shows_waterline(scan: PreparedScan | Scan) -> bool:
     """Return True if it shows the water's level: that is level, while errors of slope accumulate."""
-    return len(scan.level) >= MIN_LEVEL_POINTS
+    return len(scan.level.points) >= MIN_LEVEL_POINTS
 
 
 def _levelled(scan: PreparedScan, pose: Pose) -> Scan:

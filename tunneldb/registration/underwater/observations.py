@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 from tunneldb.arrays import Float, Int64
 from tunneldb.registration.underwater.ladder_shape import PlacedLadder, nearest_element
 from tunneldb.registration.underwater.walls import Walls
+from tunneldb.registration.underwater.water_surface import Level
 
 POSE = 7  # parameters of a pose
 RANGE_NOISE = 0.015  # m, of a BV5000 (Moisan et al., 2015, section 3)
@@ -24,14 +25,15 @@ BEAM_SPREAD = BEAM / np.sqrt(8.0 * np.log(2.0))  # of its power, assumed normall
 STRETCH = 2.0  # m of wall or bed: its relief is the same for all scans
 SHARED = 0.002  # m: common error of a stretch of wall or bed, by relief and slanting beams
 BARS_BEAMS = 4.0  # beams across a bar whose errors are independent: beams that hit it overlap
-WATERLINE_NOISE = 0.025  # m: half a bin, and half of the rest of half a beam
+WATERLINE_NOISE = 0.025  # m, of upper edges of walls: half a bin, and half of the rest of half a beam
 WATERLINE_SHARED = 0.01  # m
 WATER_MOVEMENT = 0.015  # m of the water between two scans
 FIRMNESS = 30.0  # factor by which a height is held that only the water gives
 MAX_UPRIGHT = 0.4  # greatest vertical component of the normal of an upright wall
 PROFILE_SPACING, PROFILE_NOISE = 0.15, 0.01  # m between a patch and the plan's nearest point, along the wall; m of the plan
-PROFILE_STRETCH, PROFILE_SHARED = 0.5, 0.01  # m of a flank or recess; m, its common error above and below the water
+PROFILE_STRETCH, PROFILE_SHARED = 0.5, 0.03  # m of a flank or recess; m, its common error above and below the water
 MIN_PROFILE_COSINE, MIN_PROFILE_PATCHES = 0.8, 4
+MAX_WALL_DISTANCE = 1.0  # m in plan, of a column from the wall that it belongs to
 MIN_FACING_COSINE = 0.9  # least cosine between the normals of compared patches
 WALL_DEPTH = 3.0  # m below the water
 WALL_TOP = 0.05  # m below the water; closer to it, echoes by way of the surface disturb
@@ -258,10 +260,12 @@ def wall_rows(
     return out
 
 
-def profile_rows(patches: Patches, pose: Pose, walls: Walls, scan: int, within: float) -> Rows | None:
+def profile_rows(patches: Patches, pose: Pose, walls: Walls, scan: int, columns: Int64, within: float) -> Rows | None:
     """Compare a scan's columns with the plan of the walls at the waterline: flanks of piers, ends, recesses, rough walls.
 
-    Columns that face straight pieces of wall are left to `wall_rows`.
+    Columns that face straight pieces of wall are left to `wall_rows`. The others lean as the wall beside them does, in its
+    direction: flanks stay upright. ``columns`` are the indices, among the common parameters, of the changes of batter of
+    either side.
     """
     profile = walls.profile
     if len(profile.place) == 0:
@@ -272,52 +276,59 @@ def profile_rows(patches: Patches, pose: Pose, walls: Walls, scan: int, within: 
     near = np.flatnonzero(upright & np.isfinite(away))
     k, centre, facing = k[near], centre[near], facing[near]
     normal = profile.normal[k] * np.sign((profile.normal[k] * facing[:, :2]).sum(axis=1))[:, None]
-    off = ((centre[:, :2] - profile.place[k]) * normal).sum(axis=1)
-    beside = np.sqrt(np.maximum(away[near] ** 2 - off**2, 0.0))
-    _, piece = walls.tree.query(centre[:, :2], distance_upper_bound=1.0)
-    straight = piece < len(walls.foot)
-    wall_normal = walls.normal[np.where(straight, piece, 0)]
-    straight &= ~walls.rough[np.where(straight, piece, 0)]
-    straight &= np.abs((wall_normal * normal).sum(axis=1)) > MIN_FACING_COSINE
-    straight &= np.abs(walls.distance(centre, np.where(straight, piece, 0))) < 2.0 * PROFILE_SPACING
+    level = ((centre[:, :2] - profile.place[k]) * normal).sum(axis=1)
+    beside = np.sqrt(np.maximum(away[near] ** 2 - level**2, 0.0))
+    to_wall, piece = walls.tree.query(centre[:, :2], distance_upper_bound=MAX_WALL_DISTANCE)
+    known = np.isfinite(to_wall)
+    piece = np.where(known, piece, 0)
+    cosine = np.where(known, (walls.normal[piece] * normal).sum(axis=1), 0.0)
+    off = level + walls.batter[piece] * cosine * centre[:, 2]
+    straight = known & ~walls.rough[piece] & (np.abs(cosine) > MIN_FACING_COSINE)
+    straight &= np.abs(walls.distance(centre, piece)) < 2.0 * PROFILE_SPACING
     keep = ~straight & ((normal * facing[:, :2]).sum(axis=1) > MIN_PROFILE_COSINE)
     keep &= (np.abs(off) < within) & (beside < PROFILE_SPACING)
     if keep.sum() < MIN_PROFILE_PATCHES:
         return None
     near, centre, off, normal = near[keep], centre[keep], off[keep], normal[keep]
+    side, lean = walls.side[piece[keep]], cosine[keep] * centre[:, 2]
     sigma = np.sqrt(
         patches.spread[near] ** 2 / patches.count[near] + RELIEF**2 + PROFILE_NOISE**2 + profile.sigma(centre[:, 2]) ** 2
     )
     upright_normal = np.column_stack([normal, np.zeros(len(normal))])
+    group = cell_keys(centre * [1.0, 1.0, 0.0], PROFILE_STRETCH)
+    _, number, count = np.unique(group, return_inverse=True, return_counts=True)
+    sigma = np.hypot(sigma, np.sqrt(count[number]) * PROFILE_SHARED)  # a group weighs as one observation of this accuracy
     return Rows(
         off, sigma, pose_derivatives(centre, pose, upright_normal), scan, None, None,
-        np.zeros((len(off), 0)), np.zeros(0, np.int64), cell_keys(centre * [1.0, 1.0, 0.0], PROFILE_STRETCH),
+        lean[:, None] * (side[:, None] == [0, 1]), columns, group,
         np.full(len(off), PROFILE_SHARED), "profile", "",
     )  # fmt: skip
 
 
-def waterline_rows(level: Float, pose: Pose, bias: float, scan: int, column: int, *, firm: bool) -> Rows | None:
-    """Return heights of points (k, 3) of a scan at the water's level, file's axes, over the water.
+def waterline_rows(level: Level, pose: Pose, bias: float, scan: int, column: int, *, firm: bool) -> Rows | None:
+    """Return heights of a scan's points at the water's level over the water.
 
     ``bias`` m is common to all scans. The water may have moved between scans: the last row, of the mean height, has that
     uncertainty; the others state only that the water is level. With ``firm`` the last row weighs more than it is certain: of a
     scan without ladders nothing else gives the height. Battered walls only seem to: an error of a few millimetres of all of
     them is decimetres of height.
     """
-    if len(level) == 0:
+    count = len(level.points)
+    if count == 0:
         return None
-    place = pose.apply(level)
-    up = np.tile([0.0, 0.0, 1.0], (len(level), 1))
+    place = pose.apply(level.points)
+    up = np.tile([0.0, 0.0, 1.0], (count, 1))
     design = pose_derivatives(place, pose, up)
     mean, height = design.mean(axis=0), place[:, 2] - bias
-    noise = WATERLINE_NOISE / np.sqrt(len(level))
-    common = np.zeros((len(level) + 1, 1))
+    noise = level.noise / np.sqrt(count)
+    shared = WATERLINE_SHARED * level.noise / WATERLINE_NOISE / np.sqrt(count)
+    common = np.zeros((count + 1, 1))
     common[-1] = -1.0
     return Rows(
         np.append(height - height.mean(), height.mean()),
-        np.append(np.full(len(level), WATERLINE_NOISE), np.hypot(noise, WATER_MOVEMENT) / (FIRMNESS if firm else 1.0)),
-        np.vstack([design - mean, mean]), scan, None, None, common, np.array([column]), np.arange(len(level) + 1),
-        np.append(np.full(len(level), WATERLINE_SHARED / np.sqrt(len(level))), WATER_MOVEMENT), "waterline", "",
+        np.append(np.full(count, level.noise), np.hypot(noise, WATER_MOVEMENT) / (FIRMNESS if firm else 1.0)),
+        np.vstack([design - mean, mean]), scan, None, None, common, np.array([column]), np.arange(count + 1),
+        np.append(np.full(count, shared), WATER_MOVEMENT), "waterline", "",
     )  # fmt: skip
 
 

@@ -14,11 +14,17 @@ from tunneldb.registration.underwater.adjustment import Scan, fit, scan_of
 from tunneldb.registration.underwater.choice import MIN_MARGIN, Evidence, explained, margin
 from tunneldb.registration.underwater.first_pose import Candidate, LevelScan, candidates, level, likeness
 from tunneldb.registration.underwater.laser_ladders import LaserLadder
-from tunneldb.registration.underwater.observations import Patches, Pose, find_patches, find_smooth_patches
+from tunneldb.registration.underwater.observations import (
+    WATERLINE_NOISE,
+    Patches,
+    Pose,
+    find_patches,
+    find_smooth_patches,
+)
 from tunneldb.registration.underwater.plan_search import PlanPose, find_columns, find_plan_poses, plan_cells
 from tunneldb.registration.underwater.results import SonarCloud
 from tunneldb.registration.underwater.walls import Walls
-from tunneldb.registration.underwater.water_surface import is_upside_down
+from tunneldb.registration.underwater.water_surface import Level, is_upside_down, surface_noise
 
 HEIGHT_TOLERANCE = 0.45  # m between the water in a scan and the laser's water level
 MAX_LADDER_CANDIDATES, MAX_PLAN_CANDIDATES = 8, 20  # candidates of a scan that are fitted
@@ -35,7 +41,7 @@ MAX_MIRROR_SHARE = 0.4  # greatest share if the water's surface mirrors walls an
 MAX_LADDER_RANGE = 12.0  # m from the scanner
 SIGHT_RANGE = 7.0  # m: a closer ladder must be visible, or the pose is unlikely: its bars are two beams apart
 MISSED_LOG_ODDS = float(np.log(0.05))  # of a pose at which a ladder in sight is not seen
-MAX_LEVEL_POINTS = 40  # of the water's surface that are used
+MAX_LEVEL_POINTS = 150  # of the water's surface that are used
 MIN_PLAN_SCORE = 0.15  # least weighted share of a scan's walls that match the laser's plan
 MAX_SLIDE = 1.0  # m by which a fit may move a candidate
 
@@ -54,8 +60,7 @@ class PreparedScan:
         Patches of all of its points.
     columns : Patches
         Columns of its upright walls.
-    level : (k, 3) float64 array
-        Points at the water's level, file's axes.
+    level : Level
     """
 
     cloud: SonarCloud
@@ -64,7 +69,7 @@ class PreparedScan:
     patches: Patches
     smooth: Patches
     columns: Patches
-    level: Float
+    level: Level
 
 
 @dataclass(frozen=True)
@@ -116,9 +121,11 @@ def prepare(cloud: SonarCloud, walls: Walls) -> PreparedScan:
     flat = level(cloud.points[:: max(1, len(cloud.points) // LEVEL_POINTS)], cloud.up, walls.widths)
     patches, smooth = find_patches(cloud.points), find_smooth_patches(cloud.points)
     water = flat.surface if len(flat.surface) else flat.edges
+    noise = surface_noise(flat.surface) if len(flat.surface) else WATERLINE_NOISE
     water = water[:: max(1, -(-len(water) // MAX_LEVEL_POINTS))]
     columns = find_columns(flat, cloud.points)
-    return PreparedScan(cloud, flat, cloud.points[::every], patches, smooth, columns, water @ flat.rotation)
+    level_points = Level(water @ flat.rotation, noise)
+    return PreparedScan(cloud, flat, cloud.points[::every], patches, smooth, columns, level_points)
 
 
 def start(scan: PreparedScan, walls: Walls, found: Sequence[LaserLadder]) -> list[Hypothesis] | NotStarted:
@@ -149,9 +156,9 @@ def start(scan: PreparedScan, walls: Walls, found: Sequence[LaserLadder]) -> lis
 
 def _water_error(scan: PreparedScan, pose: Pose) -> float:
     """Return the distance of the water in a scan from the laser's water level, m; 0 if the scan does not show it."""
-    if len(scan.level) < MIN_LEVEL_POINTS:
+    if len(scan.level.points) < MIN_LEVEL_POINTS:
         return 0.0
-    return abs(float(np.median(pose.apply(scan.level)[:, 2])))
+    return abs(float(np.median(pose.apply(scan.level.points)[:, 2])))
 
 
 def _candidates(scan: PreparedScan, walls: Walls, found: Sequence[LaserLadder]) -> list[_Fitted]:
@@ -171,7 +178,7 @@ def _candidates(scan: PreparedScan, walls: Walls, found: Sequence[LaserLadder]) 
         if not cloud.may_face(first.rotation):
             continue
         fitted = _fit_to_plan(scan, patches, first, walls, found)
-        has_height = bool(fitted.ladders) or len(scan.level) >= MIN_LEVEL_POINTS
+        has_height = bool(fitted.ladders) or len(scan.level.points) >= MIN_LEVEL_POINTS
         if has_height and np.linalg.norm((fitted.pose.translation - first.translation)[:2]) < MAX_SLIDE:
             out.append(fitted)
     return out
@@ -193,7 +200,7 @@ def _fit_to_ladder(
 ) -> _Fitted:
     """Fit a candidate from a ladder: its height is the ladder's, and is compared with the water's afterwards."""
     first = tuple(k for k, one in enumerate(found) if one.placed.ladder.name == candidate.ladder)
-    no_level = np.zeros((0, 3))
+    no_level = Level(np.zeros((0, 3)), np.inf)
     pose = Pose(candidate.rotation, candidate.translation, 1.0)
     pose = _fit(scan_of(scan.thin, patches, patches, scan.columns, no_level, pose, first, found), walls, found, FIRST_REACHES)
     near = _near(pose, found)

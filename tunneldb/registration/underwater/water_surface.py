@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from tunneldb.arrays import Float
@@ -15,9 +17,23 @@ MAX_SPREAD = 0.04  # m of the surface about its plane
 MAX_SPREAD_RATIO = 1.2  # of the surface and the bed: in a scan that is upside down the bed is above
 MAX_EDGE_ERROR = 0.2  # m between the surface and the upper edges of the walls
 MAX_WATER_SPREAD, MIN_BED_RATIO = 0.015, 4.0  # m; ratio of a bed's spread to the water's from which they are told apart
+MIN_SURFACE_NOISE = 0.005  # m: ripples
 ROUNDS = 10
 
 Place = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Level:
+    """Points (k, 3) of a scan at the water's level, file's axes, and the standard deviation of one of them, m."""
+
+    points: Float
+    noise: float
+
+
+def surface_noise(surface: Float) -> float:
+    """Return the standard deviation, m, of points (k, 3) of the water's surface about their plane."""
+    return _flat({(x, y): z for x, y, z in surface.tolist()})[1]
 
 
 def find_surface(points: Float, walls: tuple[float, float], top: float) -> Float:
@@ -78,7 +94,7 @@ def _flat(cells: dict[Place, float]) -> tuple[Float, float]:
     answer, scale = np.array([float(np.median(points[:, 2])), 0.0, 0.0]), np.inf
     for _ in range(ROUNDS):
         residual = points[:, 2] - design @ answer
-        scale = max(MAD_TO_SIGMA * float(np.median(np.abs(residual))), 0.005)
+        scale = max(MAD_TO_SIGMA * float(np.median(np.abs(residual))), MIN_SURFACE_NOISE)
         weight = 1.0 / (1.0 + (residual / (2.0 * scale)) ** 2) ** 2
         weighted = design * weight[:, None]
         answer = np.linalg.lstsq(weighted.T @ design, weighted.T @ points[:, 2], rcond=None)[0]
