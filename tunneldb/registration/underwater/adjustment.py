@@ -52,6 +52,7 @@ SLANT = 0.0003
 QUARTER_WEIGHT_SIGMA = 3.0  # standard deviations at which the weight of a row is a quarter
 REACHES = (0.3, 0.2, 0.15, 0.12, *[0.1] * 30)  # greatest distance of rows, round by round, m
 MAX_CHANGE = 1e-5
+MAX_DRIFT = 0.15  # m of plan in one round, of a direction that is hardly determined (Marquardt, 1963)
 SURROUNDINGS = 0.6  # m around a ladder, more than the error of a first pose
 FIXED_PRECISION = 1e8  # precision of fixed parameters
 MAX_SINGULAR_SHARE = 1e-12  # share of the largest eigenvalue up to which a direction is undetermined
@@ -189,6 +190,9 @@ def fit(
     precision = _prior(len(scans), ladders, radius)
     if not any(scan.ladders for scan in scans):
         precision[POSE * len(scans) + 3, POSE * len(scans) + 3] = 1.0 / WATERLINE_FIRM_SIGMA**2
+    plan = np.add.outer(POSE * np.arange(len(scans)), [3, 4]).ravel()
+    damping = np.zeros((count, count))
+    damping[plan, plan] = 1.0 / MAX_DRIFT**2
     stay = np.append(np.arange(POSE * fixed), [POSE * fixed + 5] if hold_height else []).astype(np.int64)
     normal, rows = np.eye(count), []
     for reach in reaches:
@@ -198,7 +202,7 @@ def fit(
         normal[stay, stay] += FIXED_PRECISION
         offset = _prior_offset(poses, placed, ladders, common - usual)
         offset[stay] = 0.0
-        change = -_inverse(normal + precision, 0.0) @ (right + precision @ offset)
+        change = -_inverse(normal + precision + damping, 0.0) @ (right + precision @ offset)
         change[stay] = 0.0
         for i, pose in enumerate(poses):
             poses[i] = _moved(pose, change[POSE * i : POSE * (i + 1)])
@@ -266,7 +270,7 @@ def weights_of(rows: Rows) -> Float:
 
 def _deviation(rows: Rows) -> Float:
     """Return the residuals (n,) in standard deviations; those of a point across and along the beam are combined."""
-    z = np.abs(rows.residual / rows.sigma)
+    z = np.abs(rows.residual / (rows.sigma if rows.scatter is None else rows.scatter))
     if rows.kind == "ladder":
         half = len(z) // 2
         z = np.tile(np.hypot(z[:half], z[half:]), 2) / np.sqrt(2.0)

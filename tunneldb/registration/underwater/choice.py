@@ -17,6 +17,7 @@ from tunneldb.registration.underwater.observations import BEAM_SIGMA, MAX_RANGE,
 from tunneldb.registration.underwater.walls import Walls
 
 HALF_EXPLAINED_SIGMA = 3.0  # standard deviations at which a point is explained by half
+WALL_REACH = 1.0  # m in plan, of a wall
 UNEXPLAINED = 1e4  # squared standard deviations of a point that is at no wall
 CELL = 0.25  # m, of a ladder
 COLUMN = 0.5  # m in plan, of a wall: its plan is the same at all heights
@@ -42,20 +43,23 @@ class Evidence:
     ladder: Bool
 
 
-def explained(points: Float, pose: Pose, walls: Walls, ladders: Sequence[PlacedLadder]) -> Evidence:
-    """Return the evidence of points (n, 3), file's axes, for a pose."""
+def explained(points: Float, upright: Bool, pose: Pose, walls: Walls, ladders: Sequence[PlacedLadder]) -> Evidence:
+    """Return the evidence of points (n, 3), file's axes, for a pose.
+
+    ``upright`` (n,) is True on upright surfaces: where the laser shows the canal but no wall there, they speak against it.
+    """
     space = pose.apply(points)
     reach = np.linalg.norm(space - pose.translation, axis=1)
     best = np.full(len(points), np.inf)
     usable = reach < MAX_RANGE
-    away, piece = walls.tree.query(space[:, :2], distance_upper_bound=1.0)
-    known = np.isfinite(away)
-    known[known] = ~walls.rough[piece[known]]
+    away, piece = walls.tree.query(space[:, :2])
+    near, shown = away < WALL_REACH, away < walls.widths[1]
+    known = near & ~walls.rough[piece]
     sigma = np.sqrt(RANGE_NOISE**2 + RELIEF**2 + walls.profile.sigma(space[:, 2]) ** 2)
     best[known] = (walls.distance(space[known], piece[known]) / sigma[known]) ** 2
+    best[~known & (near | (upright & shown))] = UNEXPLAINED  # before rock or behind it, or an upright surface in open water
     profile_away, _ = walls.profile.tree.query(space[:, :2], distance_upper_bound=PROFILE_REACH)
     there = np.isfinite(profile_away)
-    best[np.isfinite(away) & ~known & ~there] = UNEXPLAINED  # before rock, or behind it
     best[there] = np.minimum(best[there], (profile_away[there] / np.hypot(sigma[there], PROFILE_SIGMA)) ** 2)
     by_ladder = np.zeros(len(points), np.bool_)
     for placed in ladders:

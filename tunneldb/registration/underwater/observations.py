@@ -31,7 +31,7 @@ WATER_MOVEMENT = 0.015  # m of the water between two scans
 FIRMNESS = 30.0  # factor by which a height is held that only the water gives
 MAX_UPRIGHT = 0.4  # greatest vertical component of the normal of an upright wall
 PROFILE_SPACING, PROFILE_NOISE = 0.15, 0.01  # m between a patch and the plan's nearest point, along the wall; m of the plan
-PROFILE_STRETCH, PROFILE_SHARED = 0.5, 0.03  # m of a flank or recess; m, its common error above and below the water
+PROFILE_STRETCH, PROFILE_SHARED = 1.0, 0.03  # m of a flank or recess; m, its common error above and below the water
 MIN_PROFILE_COSINE, MIN_PROFILE_PATCHES = 0.8, 4
 MAX_WALL_DISTANCE = 1.0  # m in plan, of a column from the wall that it belongs to
 MIN_FACING_COSINE = 0.9  # least cosine between the normals of compared patches
@@ -99,6 +99,8 @@ class Rows:
     shared : (n,) float64 array
         Standard deviation of the common error of a group, m.
     kind, name : str
+    scatter : (n,) float64 array, optional
+        Standard deviations of single residuals, if ``sigma`` is larger because rows of a group repeat the same error.
     """
 
     residual: Float
@@ -113,6 +115,7 @@ class Rows:
     shared: Float
     kind: str
     name: str
+    scatter: Float | None = None
 
 
 def cell_keys(points: Float, edge: float) -> Int64:
@@ -224,6 +227,8 @@ def wall_rows(
 ) -> list[Rows]:
     """Compare a scan's patches with walls at most ``within`` m away.
 
+    Moves along a wall change nothing: derivatives are along the normals of its course.
+
     ``common`` are the offset of sonar ranges in front of masonry relative to the laser, m, and the slant (`nearer_by_slant`).
     ``columns`` are the indices, among the common parameters, of the changes of batter of either side, and of these two.
     """
@@ -245,6 +250,8 @@ def wall_rows(
         + (walls.sigma_batter[piece] * centre[:, 2]) ** 2
     )
     batter = centre[:, 2] / np.sqrt(1.0 + walls.batter[piece] ** 2)
+    facing_course = np.column_stack([walls.course[piece], walls.batter[piece]])
+    facing_course /= np.linalg.norm(facing_course, axis=1)[:, None]
     nearer = nearer_by_slant(centre, pose.translation, normal)
     stretch = _stretches(walls.foot[piece])
     out = []
@@ -252,10 +259,12 @@ def wall_rows(
         rows = walls.side[piece] == side
         if rows.any():
             design = np.column_stack([batter[rows], np.full(int(rows.sum()), -1.0), -nearer[rows]])
+            moves = pose_derivatives(centre[rows], pose, facing_course[rows])
             out.append(
-                Rows(off[rows] - zero - slant * nearer[rows], sigma[rows], pose_derivatives(centre[rows], pose, normal[rows]),
-                     scan, None, None, design, columns[[side, 2, 3]], stretch[rows], np.full(int(rows.sum()), SHARED),
-                     "wall", "left" if side else "right")
+                Rows(
+                    off[rows] - zero - slant * nearer[rows], sigma[rows], moves, scan, None, None, design,
+                    columns[[side, 2, 3]], stretch[rows], np.full(int(rows.sum()), SHARED), "wall", "left" if side else "right",
+                )
             )  # fmt: skip
     return out
 
@@ -291,17 +300,17 @@ def profile_rows(patches: Patches, pose: Pose, walls: Walls, scan: int, columns:
         return None
     near, centre, off, normal = near[keep], centre[keep], off[keep], normal[keep]
     side, lean = walls.side[piece[keep]], cosine[keep] * centre[:, 2]
-    sigma = np.sqrt(
-        patches.spread[near] ** 2 / patches.count[near] + RELIEF**2 + PROFILE_NOISE**2 + profile.sigma(centre[:, 2]) ** 2
-    )
+    sigma = np.sqrt(patches.spread[near] ** 2 / patches.count[near] + RELIEF**2 + PROFILE_NOISE**2)
+    shared = np.hypot(PROFILE_SHARED, profile.sigma(centre[:, 2]))
     upright_normal = np.column_stack([normal, np.zeros(len(normal))])
     group = cell_keys(centre * [1.0, 1.0, 0.0], PROFILE_STRETCH)
     _, number, count = np.unique(group, return_inverse=True, return_counts=True)
-    sigma = np.hypot(sigma, np.sqrt(count[number]) * PROFILE_SHARED)  # a group weighs as one observation of this accuracy
+    scatter = np.hypot(sigma, shared)
+    sigma = np.hypot(sigma, np.sqrt(count[number]) * shared)  # a group weighs as one observation of this accuracy
     return Rows(
         off, sigma, pose_derivatives(centre, pose, upright_normal), scan, None, None,
         lean[:, None] * (side[:, None] == [0, 1]), columns, group,
-        np.full(len(off), PROFILE_SHARED), "profile", "",
+        shared, "profile", "", scatter,
     )  # fmt: skip
 
 
@@ -309,9 +318,9 @@ def waterline_rows(level: Level, pose: Pose, bias: float, scan: int, column: int
     """Return heights of a scan's points at the water's level over the water.
 
     ``bias`` m is common to all scans. The water may have moved between scans: the last row, of the mean height, has that
-    uncertainty; the others state only that the water is level. With ``firm`` the last row weighs more than it is certain: of a
-    scan without ladders nothing else gives the height. Battered walls only seem to: an error of a few millimetres of all of
-    them is decimetres of height.
+    uncertainty; the others state only that the water is level. With ``firm`` the last row weighs more than it is certain, and
+    does not change ``bias``: of a scan without ladders nothing else gives the height. Battered walls only seem to: an error of
+    a few millimetres of all of them is decimetres of height.
     """
     count = len(level.points)
     if count == 0:
@@ -323,7 +332,8 @@ def waterline_rows(level: Level, pose: Pose, bias: float, scan: int, column: int
     noise = level.noise / np.sqrt(count)
     shared = WATERLINE_SHARED * level.noise / WATERLINE_NOISE / np.sqrt(count)
     common = np.zeros((count + 1, 1))
-    common[-1] = -1.0
+    if not firm:
+        common[-1] = -1.0
     return Rows(
         np.append(height - height.mean(), height.mean()),
         np.append(np.full(count, level.noise), np.hypot(noise, WATER_MOVEMENT) / (FIRMNESS if firm else 1.0)),

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 from scipy.special import log_ndtr
 
-from tunneldb.arrays import Float
+from tunneldb.arrays import Bool, Float
 from tunneldb.errors import UserError
-from tunneldb.registration.underwater.adjustment import Scan, fit, scan_of
+from tunneldb.registration.underwater.adjustment import SCALE_SIGMA, Scan, fit, scan_of
 from tunneldb.registration.underwater.choice import MIN_MARGIN, Evidence, explained, margin
 from tunneldb.registration.underwater.first_pose import Candidate, LevelScan, candidates, level, likeness
 from tunneldb.registration.underwater.laser_ladders import LaserLadder
@@ -21,7 +22,7 @@ from tunneldb.registration.underwater.observations import (
     find_patches,
     find_smooth_patches,
 )
-from tunneldb.registration.underwater.plan_search import PlanPose, find_columns, find_plan_poses, plan_cells
+from tunneldb.registration.underwater.plan_search import COLUMN, PlanPose, find_columns, find_plan_poses, plan_cells
 from tunneldb.registration.underwater.results import SonarCloud
 from tunneldb.registration.underwater.walls import Walls
 from tunneldb.registration.underwater.water_surface import Level, is_upside_down, surface_noise
@@ -56,6 +57,8 @@ class PreparedScan:
     flat : LevelScan
     thin : (n, 3) float64 array
         Evenly thinned points, file's axes.
+    upright : (n,) bool array
+        True for those on upright surfaces.
     patches, smooth : Patches
         Patches of all of its points.
     columns : Patches
@@ -66,6 +69,7 @@ class PreparedScan:
     cloud: SonarCloud
     flat: LevelScan
     thin: Float
+    upright: Bool
     patches: Patches
     smooth: Patches
     columns: Patches
@@ -125,7 +129,17 @@ def prepare(cloud: SonarCloud, walls: Walls) -> PreparedScan:
     water = water[:: max(1, -(-len(water) // MAX_LEVEL_POINTS))]
     columns = find_columns(flat, cloud.points)
     level_points = Level(water @ flat.rotation, noise)
-    return PreparedScan(cloud, flat, cloud.points[::every], patches, smooth, columns, level_points)
+    thin = cloud.points[::every]
+    return PreparedScan(cloud, flat, thin, _on_columns(thin, columns, flat), patches, smooth, columns, level_points)
+
+
+def _on_columns(points: Float, columns: Patches, flat: LevelScan) -> Bool:
+    """Return True for the points (n, 3) that lie on upright columns, in plan."""
+    if len(columns.centre) == 0:
+        return np.zeros(len(points), np.bool_)
+    plan, own = (columns.centre @ flat.rotation.T)[:, :2], (points @ flat.rotation.T)[:, :2]
+    away, _ = cKDTree(plan).query(own, distance_upper_bound=COLUMN)
+    return np.isfinite(away)
 
 
 def start(scan: PreparedScan, walls: Walls, found: Sequence[LaserLadder]) -> list[Hypothesis] | NotStarted:
@@ -144,14 +158,14 @@ def start(scan: PreparedScan, walls: Walls, found: Sequence[LaserLadder]) -> lis
     high = float(np.median([(one.pose.apply(scan.thin)[:, 2] > MIN_AIR_HEIGHT).mean() for one in fitted]))
     if high > (MAX_MIRROR_SHARE if len(scan.flat.surface) else MAX_AIR_SHARE):
         raise UserError(f"{scan.cloud.path}: {100.0 * high:.0f} % of its points would be above the water; check --up")
-    scaled = [one for one in fitted if abs(one.pose.scale - 1.0) < MAX_SCALE_ERROR]
-    off = float(np.median([one.pose.scale for one in fitted if one.ladders or not scaled] or [1.0])) - 1.0
+    level = [one for one in fitted if _water_error(scan, one.pose) < MAX_WATER_ERROR]
+    if not level:
+        return NotStarted("its ladder and its walls disagree about the water level")
+    weighed = _weighed(scan, _distinct(level), walls, found)
+    off = weighed[0].pose.scale - 1.0
     if abs(off) > MAX_SCALE_ERROR:
         return NotStarted(f"its ranges would be wrong by {-100.0 * off:+.1f} %; check the speed of sound (--sound-speed)")
-    high_enough = [one for one in scaled if _water_error(scan, one.pose) < MAX_WATER_ERROR]
-    if not high_enough:
-        return NotStarted("its ladder and its walls disagree about the water level")
-    return _weighed(scan, _distinct(high_enough), walls, found)
+    return [one for one in weighed if abs(one.pose.scale - 1.0) < MAX_SCALE_ERROR]
 
 
 def _water_error(scan: PreparedScan, pose: Pose) -> float:
@@ -207,6 +221,10 @@ def _fit_to_ladder(
     pose = _fit(
         scan_of(scan.thin, patches, patches, scan.columns, no_level, pose, near, found), walls, found, FIRST_REACHES[-3:]
     )
+    if _water_error(scan, pose) < MAX_WATER_ERROR:
+        near = visible_ladders(scan, pose, found) or near
+        with_level = scan_of(scan.thin, patches, scan.smooth, scan.columns, scan.level, pose, near, found)
+        pose = _fit(with_level, walls, found, FIRST_REACHES[-3:])
     return _seen(scan, pose, found)
 
 
@@ -241,7 +259,7 @@ def _distinct(fitted: Sequence[_Fitted]) -> list[_Fitted]:
 def _weighed(scan: PreparedScan, fitted: Sequence[_Fitted], walls: Walls, found: Sequence[LaserLadder]) -> list[Hypothesis]:
     """Return candidates with their odds against the best one: by all points, the water's level, and ladders in sight."""
     evidence = [_evidence(scan, one.pose, walls, found) for one in fitted]
-    plan = [explained(scan.thin, one.pose, walls, ()) for one in fitted]
+    plan = [explained(scan.thin, scan.upright, one.pose, walls, ()) for one in fitted]
     other = np.array([_log_prior(scan, one) for one in fitted])
 
     def log_odds(k: int, best: int) -> float:
@@ -257,12 +275,13 @@ def _weighed(scan: PreparedScan, fitted: Sequence[_Fitted], walls: Walls, found:
 
 
 def _evidence(scan: PreparedScan, pose: Pose, walls: Walls, found: Sequence[LaserLadder]) -> Evidence:
-    return explained(scan.thin, pose, walls, [found[k].placed for k in _near(pose, found)])
+    return explained(scan.thin, scan.upright, pose, walls, [found[k].placed for k in _near(pose, found)])
 
 
 def _log_prior(scan: PreparedScan, one: _Fitted) -> float:
     sigma = SURFACE_SIGMA if len(scan.flat.surface) else EDGE_SIGMA
-    return -0.5 * (_water_error(scan, one.pose) / sigma) ** 2 + one.missed * MISSED_LOG_ODDS
+    level, scale = _water_error(scan, one.pose) / sigma, (one.pose.scale - 1.0) / SCALE_SIGMA
+    return -0.5 * (level**2 + scale**2) + one.missed * MISSED_LOG_ODDS
 
 
 def missing_ladder_count(pose: Pose, seen: Sequence[int], found: Sequence[LaserLadder]) -> int:

@@ -24,6 +24,7 @@ FOOT, HEAD = 0.02, 1.5  # heights, m, between which a wall is fitted
 MIN_HEIGHT = 0.25  # least height of the fitted points, m
 MAX_BATTER = 0.3  # batter, tangent
 MAX_ROUGHNESS = 0.04  # m, of a wall that continues below the water as a plane
+MAX_ROUGH_SHARE = 0.5  # share of rough pieces from which the walls are rock: its smooth pieces are no planes either
 MAX_ROCK_ROUGHNESS = 0.3  # m, of a wall that is only known by its plan
 WIDTH_QUANTILES = (0.05, 0.95)  # of the widths that occur
 MIN_EDGE_POINTS = 200  # for the lower edge of the walls
@@ -32,6 +33,7 @@ MIN_WIDTH, MAX_WIDTH = 2.0, 40.0  # canal, m
 TUKEY = 4.685
 MAX_WALL_DISTANCE = 0.05  # m
 EDGE_BIN = 0.02  # m of height, for the lower edge of the walls
+COURSE_REACH, COURSE_COSINE = 4.0, 0.9  # m; of the normals of one wall
 USUAL_HEIGHTS = (0.1, 0.6)  # heights, m, between which walls have their usual point density
 
 
@@ -55,6 +57,9 @@ class Walls:
         True for rock: the wall does not continue below the water as a plane.
     profile : Profile
         Plan of the walls at the waterline, with its piers and recesses.
+    course : (k, 2) float64 array
+        Unit normals of the course of the wall. A piece's own normal follows dents of the wall and errors of its fit, which
+        tell nothing about the place along it.
     """
 
     foot: Float
@@ -65,6 +70,7 @@ class Walls:
     side: Int64
     rough: Bool
     profile: Profile
+    course: Float
 
     @cached_property
     def tree(self) -> cKDTree:
@@ -75,7 +81,7 @@ class Walls:
         """Return the pieces of a mask (k,)."""
         return Walls(
             self.foot[keep], self.normal[keep], self.batter[keep], self.sigma[keep], self.sigma_batter[keep], self.side[keep],
-            self.rough[keep], self.profile,
+            self.rough[keep], self.profile, self.course[keep],
         )  # fmt: skip
 
     def distance(self, points: Float, piece: Int64) -> Float:
@@ -119,6 +125,7 @@ def find_walls(points: Float) -> Walls:
             "no wall reaches down to the water in the laser's points; check --water-level (in the tunnel's height system)"
         )
     table = np.array(found)
+    rough = table[:, 8] > MAX_ROUGHNESS
     foot, normal = table[:, :3], table[:, 3:5]
     walls = Walls(
         foot,
@@ -127,10 +134,12 @@ def find_walls(points: Float) -> Walls:
         table[:, 6],
         table[:, 7],
         np.zeros(len(foot), np.int64),
-        table[:, 8] > MAX_ROUGHNESS,
+        rough | (rough.mean() > MAX_ROUGH_SHARE),
         find_profile(points),
+        normal,
     )
-    return _orient(walls)
+    oriented = _orient(walls)
+    return replace(oriented, course=_course(oriented))
 
 
 def lower_edge(points: Float, walls: Walls) -> float:
@@ -192,13 +201,26 @@ def _fit(near: Float, low: Float, tree: cKDTree, low_tree: cKDTree, centre: Floa
     return [*foot, 0.0, *normal, -answer[2] * sign * line[0], sigma, sigma_batter, scale]
 
 
+def _course(walls: Walls) -> Float:
+    """Return the mean normals (k, 2) of the pieces within COURSE_REACH of each that face the same way."""
+    near = walls.tree.query_pairs(COURSE_REACH, output_type="ndarray")
+    i, j = np.concatenate([near, near[:, ::-1]]).T
+    same = (walls.normal[i] * walls.normal[j]).sum(axis=1) > COURSE_COSINE
+    i, j = i[same], j[same]
+    total = walls.normal + np.column_stack([np.bincount(i, walls.normal[j, k], len(walls.normal)) for k in (0, 1)])
+    return np.asarray(total / np.linalg.norm(total, axis=1)[:, None])
+
+
 def _opposite(foot: Float, normal: Float) -> tuple[Float, Bool]:
-    """Return the median distance, m, of each piece to the opposite wall along its normal, and whether there is one."""
-    away = foot[None, :, :2] - foot[:, None, :2]
-    ahead = (away * normal[:, None]).sum(axis=2)
-    lateral = np.abs(away[..., 0] * -normal[:, None, 1] + away[..., 1] * normal[:, None, 0])
+    """Return the distance, m, of each piece to the opposite wall along its normal, and whether there is one."""
+    near = cKDTree(foot[:, :2]).query_pairs(MAX_WIDTH + 2.0 * SPACING, output_type="ndarray")
+    i, j = np.concatenate([near, near[:, ::-1]]).T
+    away = foot[j, :2] - foot[i, :2]
+    ahead = (away * normal[i]).sum(axis=1)
+    lateral = np.abs(away[:, 0] * -normal[i, 1] + away[:, 1] * normal[i, 0])
     facing = (ahead > MIN_WIDTH) & (ahead < MAX_WIDTH) & (lateral < 2.0 * SPACING)
-    distance = np.where(facing, ahead, np.inf).min(axis=1)
+    distance = np.full(len(foot), np.inf)
+    np.minimum.at(distance, i[facing], ahead[facing])
     return distance, np.isfinite(distance)
 
 
