@@ -7,7 +7,10 @@ several of the same width and contrast.
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import rasterio.features
@@ -16,6 +19,7 @@ from scipy import ndimage
 
 from tunneldb.arrays import Bool, Float, Single
 from tunneldb.robust import MAD_TO_SIGMA
+from tunneldb.structures.results import LeftOut
 from tunneldb.structures.solidity import closed
 
 MAX_DEVIATION = 0.5
@@ -49,6 +53,9 @@ CORNERS = (3, 4)
 
 ROUNDS = 3
 """Number of fits of the sides."""
+
+Design = Literal["label", "band"]
+"""Kinds of drawn regions: a label or plate lies within its face; a band goes around a pipe or repeats."""
 
 
 @dataclass(frozen=True)
@@ -87,8 +94,8 @@ class Patch:
         return self.scatter >= abs(self.level)
 
 
-def drawn(patches: list[Patch]) -> list[bool]:
-    """Return which regions of a surface are drawn."""
+def drawn(patches: list[Patch]) -> list[Design | None]:
+    """Return the kind of each drawn region of a surface; None for the others."""
     found, widths = [], []
     for patch in patches:
         straight, round_ = deviations(patch.mask)
@@ -96,17 +103,24 @@ def drawn(patches: list[Patch]) -> list[bool]:
         clear = round_ >= max(MIN_ELLIPSE_RATIO * straight, MAX_DEVIATION)
         within = patch.free >= MIN_FREE and patch.blur <= MAX_BLUR
         around = patch.ring and patch.free >= MIN_FREE_OF_RING
-        found.append((straight <= MAX_DEVIATION and even, around or (clear and within)))
+        alone: Design | None = "band" if around else "label" if clear and within else None
+        found.append((straight <= MAX_DEVIATION and even, alone))
         widths.append(_width(patch.mask))
-    out = []
+    out: list[Design | None] = []
     for one, width, (fits, alone) in zip(patches, widths, found, strict=True):
         like = sum(
             _alike(one, other, width, wide)
             for other, wide, (straight, _) in zip(patches, widths, found, strict=True)
             if straight
         )
-        out.append(fits and (alone or like >= MIN_REPEATED))
+        out.append((alone or ("band" if like >= MIN_REPEATED else None)) if fits else None)
     return out
+
+
+def left_out(patches: Iterable[Patch], kinds: Iterable[Design | None]) -> LeftOut:
+    """Count regions that are drawn or stray."""
+    count = Counter(kind or ("stray" if patch.stray else None) for patch, kind in zip(patches, kinds, strict=True))
+    return LeftOut(count["label"], count["band"], count["stray"])
 
 
 def _width(mask: Bool) -> float:

@@ -17,7 +17,7 @@ from tunneldb.structures.joining import Extent, RangeImages, coplanar, join
 from tunneldb.structures.level import UNKNOWN
 from tunneldb.structures.materials import parts_of_plane
 from tunneldb.structures.models import AXIS, POINT, RADIUS, unroll
-from tunneldb.structures.results import Face, Member, MemberKind, Spot, Structures, kind_of, outline_of
+from tunneldb.structures.results import Face, LeftOut, Member, MemberKind, Spot, Structures, kind_of, outline_of
 from tunneldb.structures.segmentation import Segmentation
 from tunneldb.structures.significance import Scatter
 from tunneldb.structures.solidity import closed, ray_densities, solid_faces
@@ -105,9 +105,10 @@ def find_structures(
     faces: list[Face] = []
     spots: list[Spot] = []
     face_number, member_number = np.zeros(count + 1, np.int32), np.zeros(count + 1, np.int32)
-    pixels, scatter = int(np.count_nonzero(sums.count)), Scatter()
+    pixels, scatter, omitted = int(np.count_nonzero(sums.count)), Scatter(), LeftOut()
     for number, side, surface in zip(member_of.tolist(), side_of, surfaces, strict=True):
-        judged = _judge(found, sums, surface, reference, pixels, scatter, by_range=by_range)
+        judged, design = _judge(found, sums, surface, reference, pixels, scatter, by_range=by_range)
+        omitted += design
         for part, (contrast, here) in zip(surface, judged, strict=True):
             faces.append(_face(found, part, len(faces) + 1, number, side, contrast, here))
             face_number[part.face], member_number[part.face] = len(faces), number
@@ -129,7 +130,7 @@ def find_structures(
                 for place, spot in enumerate(here.spots, start=1)
             ]  # fmt: skip
     members = _members(faces, member_of, extents, found.origin)
-    return Found(Structures(members, faces, spots), face_number, member_number, places, anomaly)
+    return Found(Structures(members, faces, spots, omitted), face_number, member_number, places, anomaly)
 
 
 @dataclass(frozen=True)
@@ -251,8 +252,8 @@ def _judge(
     scatter: Scatter,
     *,
     by_range: bool,
-) -> list[tuple[FaceContrast, FaceSpots]]:
-    """Compute contrast and spots of the faces of a member.
+) -> tuple[list[tuple[FaceContrast, FaceSpots]], LeftOut]:
+    """Compute contrast and spots of the faces of a member, and count the regions that are left out.
 
     If there are spots the level is found again without them, because they distort it.
     """
@@ -262,7 +263,7 @@ def _judge(
         seen_by = observe_face(layout, sums, part.face, found.stations, reference)
         observed.append(seen_by if part.inside is None else some_pixels(seen_by, part.inside))
     out: list[tuple[FaceContrast, FaceSpots]] = []
-    bare = observed
+    bare, omitted = observed, LeftOut()
     for turn in range(TURNS):
         levels = member_levels(bare, layout.models[parts[0].face], by_range=by_range)
         before, out = scatter.copy(), []
@@ -271,12 +272,12 @@ def _judge(
             curves = [own.get(one.scan, levels.get(one.scan, UNKNOWN)) for one in seen]
             contrast = contrast_of(layout, part.face, seen, curves, found.noise)
             out.append((contrast, find_spots(contrast, pixels, scatter)))
-        out = without_design(out, pipe=bool(layout.models[parts[0].face][RADIUS] > 0.0))
+        out, omitted = without_design(out, pipe=bool(layout.models[parts[0].face][RADIUS] > 0.0))
         if turn == TURNS - 1 or not any(spots.spots for _, spots in out):
             break
         scatter.restore(before)
         bare = [some_pixels(seen, ~_about(spots.numbers > 0)) for seen, (_, spots) in zip(observed, out, strict=True)]
-    return out
+    return out, omitted
 
 
 def _about(spots: Bool) -> Bool:

@@ -18,8 +18,9 @@ from tunneldb.arrays import Bool, Int32, Single
 from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.state import PixelState
 from tunneldb.structures.contrast import FaceContrast
-from tunneldb.structures.drawn import drawn, patch_of
+from tunneldb.structures.drawn import drawn, left_out, patch_of
 from tunneldb.structures.face_raster import STEP
+from tunneldb.structures.results import LeftOut
 from tunneldb.structures.significance import Scatter, significance
 
 MIN_SPOT_AREA = 0.0016
@@ -132,19 +133,22 @@ def numbered(face: FaceContrast, found: list[FoundSpot], size: int) -> FaceSpots
     return FaceSpots(found, numbers, share, seen, size)
 
 
-def without_design(faces: list[tuple[FaceContrast, FaceSpots]], *, pipe: bool) -> list[tuple[FaceContrast, FaceSpots]]:
-    """Leave out the drawn regions of the faces of a surface, and stray points."""
+def without_design(
+    faces: list[tuple[FaceContrast, FaceSpots]], *, pipe: bool
+) -> tuple[list[tuple[FaceContrast, FaceSpots]], LeftOut]:
+    """Leave out the drawn regions of the faces of a surface, and stray points; count them."""
     patches = []
     for face, spots in faces:
         drop = np.where(face.judged, face.image.drop[::-1], np.int16(0)) * np.float32(STEP)
         pixel = face.image.grid.pixel
         patches += [patch_of(spot.mask, spot.corner, pixel, drop, face.judged, face.sigma, pipe=pipe) for spot in spots.spots]
-    kept = iter([not design and not patch.stray for patch, design in zip(patches, drawn(patches), strict=True)])
+    kinds = drawn(patches)
+    kept = iter([kind is None and not patch.stray for patch, kind in zip(patches, kinds, strict=True)])
     out = []
     for face, spots in faces:
         rest = [spot for spot in spots.spots if next(kept)]
         out.append((face, spots if len(rest) == len(spots.spots) else numbered(face, rest, spots.size)))
-    return out
+    return out, left_out(patches, kinds)
 
 
 def _judge(
