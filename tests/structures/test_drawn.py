@@ -58,7 +58,14 @@ def test_ring_around_a_pipe_is_drawn():
     _, column = _image()
     ring = abs(column - 80) < 15
     assert drawn(_patches(ring, pipe=True)) == ["band"]
-    assert drawn(_patches(ring)) == [None]
+
+
+def test_band_across_a_beam_is_drawn_and_rust_is_not():
+    row, column = _image()
+    wave = 4 * np.sin(row / 6.0) + 3 * np.sin(row / 2.5)
+    assert drawn(_patches(abs(column - 80) < 15)) == ["band"]
+    assert drawn(_patches(abs(column - 80 + wave) < 15)) == [None]
+    assert drawn(_patches(column < 15)) == [None], "rust at the end of a beam may end straight"
 
 
 def test_stray_points_have_no_level():

@@ -19,6 +19,7 @@ from scipy import ndimage
 
 from tunneldb.arrays import Bool, Float, Single
 from tunneldb.robust import MAD_TO_SIGMA
+from tunneldb.structures.cuts import cuts_of
 from tunneldb.structures.results import LeftOut
 from tunneldb.structures.solidity import closed
 
@@ -77,6 +78,8 @@ class Patch:
         Standard deviation of a pixel of the surface, dB.
     blur : float
         Loss of contrast beside its edge: the sum of both sides, in the contrast within it.
+    cuts : int
+        Number of straight lines that cut it off its face; see `cuts`.
     """
 
     mask: Bool
@@ -87,6 +90,7 @@ class Patch:
     scatter: float
     sigma: float
     blur: float
+    cuts: int
 
     @property
     def stray(self) -> bool:
@@ -103,6 +107,8 @@ def drawn(patches: list[Patch]) -> list[Design | None]:
         clear = round_ >= max(MIN_ELLIPSE_RATIO * straight, MAX_DEVIATION)
         within = patch.free >= MIN_FREE and patch.blur <= MAX_BLUR
         around = patch.ring and patch.free >= MIN_FREE_OF_RING
+        if patch.cuts == 2 and even and patch.blur <= MAX_BLUR:
+            straight, around = 0.0, True
         alone: Design | None = "band" if around else "label" if clear and within else None
         found.append((straight <= MAX_DEVIATION and even, alone))
         widths.append(_width(patch.mask))
@@ -173,7 +179,7 @@ def patch_of(
     free = float(within[outside].mean())
     edges = [value[side & known] for side in (rim, outside)]
     blur = 1.0 - float(np.median(edges[0]) - np.median(edges[1])) / level if level and all(map(len, edges)) else np.inf
-    return Patch(mask, pixel, free, ring, level, scatter, sigma, blur)
+    return Patch(mask, pixel, free, ring, level, scatter, sigma, blur, cuts_of(wide, within))
 
 
 def deviations(mask: Bool) -> tuple[float, float]:
