@@ -14,7 +14,7 @@ from tunneldb.structures.voxel_moments import VoxelMoments
 SIGMA = 0.4
 
 
-def _patches(*masks, pipe=False, level=2.0):
+def _patches(*masks, pipe=False, level=2.0, hidden=None):
     """Paint masks (120, 160) on an even face and measure them."""
     rng = np.random.default_rng(1)
     out = []
@@ -22,7 +22,7 @@ def _patches(*masks, pipe=False, level=2.0):
         drop = (rng.normal(0.0, SIGMA, mask.shape) + level * mask).astype(np.float32)
         rows, columns = np.nonzero(mask)
         part = mask[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
-        judged = np.ones(mask.shape, np.bool_)
+        judged = np.ones(mask.shape, np.bool_) if hidden is None else ~hidden
         out.append(patch_of(part, (int(rows.min()), int(columns.min())), 0.01, drop, judged, SIGMA, pipe=pipe))
     return out
 
@@ -43,8 +43,11 @@ def test_label_is_drawn_and_blot_is_not():
 def test_tilted_plate_is_straight():
     row, column = _image()
     u, v = 0.8 * (column - 80) + 0.6 * (row - 60), 0.8 * (row - 60) - 0.6 * (column - 80)
-    straight, round_ = deviations((abs(u) < 30) & (abs(v) < 12))
-    assert straight < 0.5 < round_
+    straight, round_, regular = deviations((abs(u) < 30) & (abs(v) < 12))
+    assert straight == regular < 0.5 < round_
+    flake = (abs(v) < 12) & (u + 0.8 * v > -30) & (u - 0.5 * v < 30)
+    straight, _, regular = deviations(flake)
+    assert straight < 0.5 < regular
 
 
 def test_stripes_of_one_width_are_drawn_though_they_end_at_the_rim():
@@ -59,13 +62,15 @@ def test_ring_around_a_pipe_is_drawn():
     ring = abs(column - 80) < 15
     assert drawn(_patches(ring, pipe=True)) == ["band"]
 
+    assert drawn(_patches(ring)) == [None]
 
-def test_band_across_a_beam_is_drawn_and_rust_is_not():
+
+def test_ring_hidden_in_part_is_drawn_and_rust_around_a_pipe_is_not():
     row, column = _image()
+    hidden = (abs(row - 60) < 8) & (column > 70)
+    assert drawn(_patches((abs(column - 80) < 15) & ~hidden, pipe=True, hidden=hidden)) == ["band"]
     wave = 4 * np.sin(row / 6.0) + 3 * np.sin(row / 2.5)
-    assert drawn(_patches(abs(column - 80) < 15)) == ["band"]
-    assert drawn(_patches(abs(column - 80 + wave) < 15)) == [None]
-    assert drawn(_patches(column < 15)) == [None], "rust at the end of a beam may end straight"
+    assert drawn(_patches(abs(column - 80 + wave) < 15, pipe=True)) == [None]
 
 
 def test_stray_points_have_no_level():

@@ -52,6 +52,9 @@ MIN_CORE = 9
 
 CORNERS = (3, 4)
 
+MAX_TURN_ERROR = 10.0
+"""Maximum deviation of the angles of a label from those of a rectangle or an equilateral triangle, degrees."""
+
 ROUNDS = 3
 """Number of fits of the sides."""
 
@@ -102,13 +105,14 @@ def drawn(patches: list[Patch]) -> list[Design | None]:
     """Return the kind of each drawn region of a surface; None for the others."""
     found, widths = [], []
     for patch in patches:
-        straight, round_ = deviations(patch.mask)
+        straight, round_, regular = deviations(patch.mask)
         even = patch.scatter <= (MAX_SCATTER + 1.5 / np.sqrt(patch.mask.sum())) * patch.sigma
         clear = round_ >= max(MIN_ELLIPSE_RATIO * straight, MAX_DEVIATION)
-        within = patch.free >= MIN_FREE and patch.blur <= MAX_BLUR
-        around = patch.ring and patch.free >= MIN_FREE_OF_RING
-        if patch.cuts == 2 and even and patch.blur <= MAX_BLUR:
-            straight, around = 0.0, True
+        sharp = patch.blur <= MAX_BLUR
+        within = patch.free >= MIN_FREE and sharp and regular <= MAX_DEVIATION
+        around = patch.ring and sharp and (patch.cuts == 2 or (patch.free >= MIN_FREE_OF_RING and patch.cuts == 1))
+        if around:
+            straight = 0.0  # what hides a part of a ring leaves it another outline
         alone: Design | None = "band" if around else "label" if clear and within else None
         found.append((straight <= MAX_DEVIATION and even, alone))
         widths.append(_width(patch.mask))
@@ -182,14 +186,26 @@ def patch_of(
     return Patch(mask, pixel, free, ring, level, scatter, sigma, blur, cuts_of(wide, within))
 
 
-def deviations(mask: Bool) -> tuple[float, float]:
-    """Return the mean deviation of a region's outline from the best triangle or quadrilateral, and from an ellipse, pixels."""
+def deviations(mask: Bool) -> tuple[float, float, float]:
+    """Return the mean deviation of a region's outline from three shapes, pixels.
+
+    The shapes are the best triangle or quadrilateral, an ellipse, and the best equilateral triangle or rectangle.
+    """
     filled = ndimage.binary_fill_holes(np.pad(mask, 1))
     parts = [shapely.geometry.shape(s) for s, _ in rasterio.features.shapes(filled.astype(np.uint8), mask=filled)]
     region = max(parts, key=lambda part: part.area)
-    shapes = [_fitted(region, corners) for corners in _corners(region)]
-    best = min((_deviation(region, one) for one in shapes if one is not None), default=np.inf)
-    return best, _deviation(region, _ellipse(filled))
+    shapes = [shape for corners in _corners(region) if (shape := _fitted(region, corners)) is not None]
+    best = min((_deviation(region, shape) for shape in shapes), default=np.inf)
+    regular = min((_deviation(region, shape) for shape in shapes if _is_regular(shape)), default=np.inf)
+    return best, _deviation(region, _ellipse(filled)), regular
+
+
+def _is_regular(shape: shapely.Polygon) -> bool:
+    """Return True if all angles are equal, as of plates and warning signs; flakes of paint have any angles."""
+    sides = np.diff(shapely.get_coordinates(shape), axis=0)
+    sides /= np.hypot(*sides.T)[:, None]
+    turn = np.degrees(np.arccos(np.clip(np.einsum("ni,ni->n", sides, np.roll(sides, -1, axis=0)), -1.0, 1.0)))
+    return bool(np.abs(turn - 360.0 / len(sides)).max() <= MAX_TURN_ERROR)
 
 
 def _deviation(region: shapely.Polygon, shape: shapely.Polygon) -> float:
