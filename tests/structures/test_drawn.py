@@ -115,3 +115,11 @@ def test_wide_vessel_is_one_cylinder():
     faces = find_faces(moments, station).faces
     assert faces.models[0, 6] == pytest.approx(6.0, rel=0.01)
     assert faces.points[0] > 0.95 * len(xyz)
+
+
+def test_straight_regions_with_the_contrast_of_bands_are_parts_of_bands():
+    row, column = _image()
+    stripes = [(row < 20) & (abs(column - at - 0.5 * row) < 4) for at in (20, 50, 80, 110)]
+    part = (row > 100) & (abs(column - 80) < 14)
+    assert drawn(_patches(*stripes, part)) == ["band"] * 5
+    assert drawn(_patches(*stripes[:2], part)) == [None] * 3

@@ -124,7 +124,16 @@ def drawn(patches: list[Patch]) -> list[Design | None]:
             if straight
         )
         out.append((alone or ("band" if like >= MIN_REPEATED else None)) if fits else None)
-    return out
+    paint = [patch.level for patch, kind in zip(patches, out, strict=True) if kind == "band"]
+    return [
+        kind or ("band" if fits and _of_paint(patch.level, paint) else None)
+        for patch, kind, (fits, _) in zip(patches, out, found, strict=True)
+    ]
+
+
+def _of_paint(level: float, bands: list[float]) -> bool:
+    """Return True if a straight region has the contrast of several bands: a part of one, as at the end of a pipe."""
+    return sum(abs(level - other) <= ALIKE * max(abs(level), abs(other)) for other in bands) >= MIN_REPEATED
 
 
 def left_out(patches: Iterable[Patch], kinds: Iterable[Design | None]) -> LeftOut:
