@@ -91,7 +91,8 @@ def significance(drop: Single, judged: Bool, sigma: Single, pixels: int, scatter
         Mean of the most different window over the chance limit, significant from 1 on; mean of the largest window, in
         standard deviations. Signed as the darkening.
     """
-    most, broad = np.zeros(drop.shape, np.float32), np.zeros(drop.shape, np.float32)
+    most: Single = np.zeros(drop.shape, np.float32)
+    broad: Single = np.zeros(drop.shape, np.float32)
     count = judged.astype(np.float32)
     ratio = np.where(judged, drop / np.maximum(sigma, 1e-3), np.float32(0.0)).astype(np.float32)
     usual = float(np.median(sigma[judged])) if judged.any() else 1.0
@@ -108,7 +109,7 @@ def significance(drop: Single, judged: Bool, sigma: Single, pixels: int, scatter
         own = robust_statistics(whole[::step], SHORTH, two_sided=True).sigma
         wide = scatter.blended(window, own, len(whole) / window**2)
         wide = float(np.hypot(wide, LEVEL_SIGMA / max(usual, 1e-3)))
-        broad = mean / np.float32(wide)
+        broad = np.asarray(mean / np.float32(wide), np.float32)
         scaled = broad / np.float32(limit(pixels, window))
         most = np.where(np.abs(scaled) > np.abs(most), scaled, most)
     return most, broad
