@@ -46,10 +46,11 @@ class Step:
             yield
 
 
-def _point_by_point(drop: Single, judged: Bool, sigma: Single, pixels: int, scatter: Any) -> Single:
+def _point_by_point(drop: Single, judged: Bool, sigma: Single, pixels: int, scatter: Any) -> tuple[Single, Single]:
     """Each pixel by itself against 3σ, in place of `significance`."""
     single = np.where(judged, drop / (SIGMAS * np.maximum(sigma, 1e-3)), 0.0)
-    return np.asarray(single, dtype=np.float32)
+    ratio = np.asarray(single, dtype=np.float32)
+    return ratio, SIGMAS * ratio
 
 
 def _white(scatter: Any, window: int, sigma: float, number: float) -> float:
@@ -57,7 +58,7 @@ def _white(scatter: Any, window: int, sigma: float, number: float) -> float:
     return 1.0 / window
 
 
-def _one_level(parts: list[list[Any]], model: Float, *, by_range: bool) -> dict[int, LevelCurve]:
+def _one_level(parts: list[list[Any]], model: Float, places: Any = None, *, by_range: bool) -> dict[int, LevelCurve]:
     """One level for the points of all scans, in place of `member_levels`."""
     seen = [one for part in parts for one in part]
     if not seen:
@@ -90,7 +91,7 @@ STEPS = (
     Step("sides of a beam not put together", [(profiles, "group", lambda surfaces, noise: np.arange(len(surfaces)))]),
     Step("a mode for each class of incidence", [(contrast, "level_curve", _by_histogram)]),
     Step("one level for all scans", [(find, "member_levels", _one_level)]),
-    Step("a face takes its member's level as it is", [(find, "face_level", lambda curve, one: curve)]),
+    Step("a face takes its member's level as it is", [(find, "face_level", lambda curve, one, **_: curve)]),
     Step("level not found again without spots", [(find, "TURNS", 1)]),
     Step("rims judged", [(contrast, name, 0.0) for name in ("BEAM", "DIVERGENCE", "TOLERANCE")]),
     Step("regions along the rim kept", [(spots, "RIM", np.inf)]),

@@ -40,6 +40,7 @@ def test_a_site(conn: psycopg.Connection, tmp_path: Path) -> None:
     assert warning < figures
     assert listed["statement"][1:] in text[warning:figures]
     assert "more than half of member 2 differs" in text[warning:figures]
+    assert "2 labels, 1 region of stray points left out" in text[warning:figures]
     assert f"<dd>{listed['count']}</dd>" in text[figures:]
     assert f"<dd>{listed['area']:.4f} " in text[figures:]
     spots = rows(text, "Spots")

@@ -22,12 +22,14 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def plant(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A wall with a dark spot behind a pipe, as LAZ."""
+    """A wall with a dark spot and a bright label behind a pipe, as LAZ."""
     seen = scan([Plate((-1, 4, 0.5), (2, 0, 0), (0, 0, 2)), Pipe((-0.3, 3, 0), (-0.3, 3, 3), 0.06)], [(0, 0, 1.5)], 0.003,
                 window=(-0.3, 0.3, -0.3, 0.3))  # fmt: skip
     level = 30 - 20 * np.log10(seen.range_m) + np.random.default_rng(1).normal(0, 0.4, len(seen.xyz))
     dark = (seen.surface == 0) & (np.linalg.norm(seen.xyz - (0.5, 4, 1.6), axis=1) < 0.15)
+    label = (seen.surface == 0) & (abs(seen.xyz[:, 0] - 0.5) < 0.2) & (abs(seen.xyz[:, 2] - 0.9) < 0.1)
     level[dark] -= 3.0
+    level[label] += 4.0
     return _write(tmp_path_factory.mktemp("plant") / "plant.laz", seen.xyz, level)
 
 
@@ -56,6 +58,7 @@ def test_points_get_their_numbers_and_keep_the_rest(plant: Path, tmp_path: Path)
     code, told = _run(plant, "-o", str(tmp_path / "out.laz"))
     assert code == 0
     assert [spot["kind"] for spot in told["spots"]] == ["dark"]
+    assert told["left_out"] == {"labels": 1, "bands": 0, "stray": 0}
     before, after = laspy.read(plant), laspy.read(tmp_path / "out.laz")
     for name in before.point_format.dimension_names:
         assert (before[name] == after[name]).all(), name
@@ -74,6 +77,7 @@ def test_polygons_lie_where_the_points_do(plant: Path, tmp_path: Path) -> None:
     assert set(layers) == {"member", "face", "spot"}
     info = pyogrio.read_info(tmp_path / "out.gpkg", layer="spot")
     assert info["features"] == 1
+    assert "1 label left out" in info["layer_metadata"]["DESCRIPTION"]
     west, south, east, north = info["total_bounds"]
     assert west == pytest.approx(0.35, abs=0.03)
     assert east == pytest.approx(0.65, abs=0.03)

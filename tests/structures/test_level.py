@@ -78,10 +78,13 @@ def test_what_one_scan_sees_mostly_covered_another_tells() -> None:
     side = Observed(**{**vars(side), "value": np.where(covered, rust(np.cos(side.angle)), side.value)})
     at = np.arange(30_000) % 300
     mostly_rust = some_pixels([side], ((at > 60) & (at < 140)).reshape(100, 300))[0]
-    levels = member_levels([[front, mostly_rust]], FLAT, by_range=False)
+    places = np.arange(30_000)
+    one_face = member_levels([[front, mostly_rust]], FLAT, by_range=False)
+    two_faces = member_levels([[front], [mostly_rust]], FLAT, [places, places], by_range=False)
     clean = ~covered[mostly_rust.pixel]
     assert clean.mean() < 0.4
-    assert np.median(off(levels[1], mostly_rust, gloss)[clean]) < 0.4
+    for levels in (one_face, two_faces):
+        assert np.median(off(levels[1], mostly_rust, gloss)[clean]) < 0.4
 
 
 def test_a_face_of_another_material_has_its_own_level() -> None:
@@ -89,6 +92,7 @@ def test_a_face_of_another_material_has_its_own_level() -> None:
     curve = curve_of([one], FLAT, by_range=False)
     darker, _ = wall(lambda cosine: lambert(cosine) - 3.0, 0.0, seed=3)
     assert np.median(off(face_level(curve, darker), darker, lambda cosine: lambert(cosine) - 3.0)) < 0.1
+    assert np.median(off(face_level(curve, darker, piece=True), darker, lambert)) < 0.1, "a stain covers a piece of a wall"
     rusty, _ = wall(lambert, -3.0, seed=4)
     half = some_pixels([rusty], (np.arange(30_000) % 300 < 150).reshape(100, 300))[0]
     assert np.median(off(face_level(curve, half), half, lambert)) < 0.1
@@ -99,11 +103,11 @@ def test_chance_passes_hardly_ever_and_weak_patches_do() -> None:
     judged = rng.random((400, 400)) < 0.9
     noise = rng.normal(0.0, 1.0, judged.shape).astype(np.float32)
     sigma = np.ones(judged.shape, np.float32)
-    none = significance(noise, judged, sigma, judged.size, Scatter())
+    none = significance(noise, judged, sigma, judged.size, Scatter())[0]
     assert (np.abs(none) > 1.0).sum() <= 10
     patch = np.zeros(judged.shape, np.bool_)
     patch[200:225, 100:125] = True
-    found = significance(noise + np.float32(1.5) * patch, judged, sigma, judged.size, Scatter()) > 1.0
+    found = significance(noise + np.float32(1.5) * patch, judged, sigma, judged.size, Scatter())[0] > 1.0
     assert found[patch].mean() > 0.9
     assert found[~np.pad(patch, 6)[3:-9, 3:-9] & ~patch].mean() < 0.001
 
@@ -116,7 +120,9 @@ def test_unevenness_is_no_spot() -> None:
     rng = np.random.default_rng(6)
     coarse = rng.normal(0.0, 0.4, (40, 40))
     uneven = np.kron(coarse, np.ones((15, 15))).astype(np.float32) + rng.normal(0.0, 0.3, (600, 600)).astype(np.float32)
-    differs = significance(uneven, np.ones(uneven.shape, np.bool_), np.full(uneven.shape, 0.5, np.float32), 360_000, Scatter())
+    differs, _ = significance(
+        uneven, np.ones(uneven.shape, np.bool_), np.full(uneven.shape, 0.5, np.float32), 360_000, Scatter()
+    )
     assert (np.abs(differs) > 1.0).mean() < 0.002
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import psycopg
 from click.testing import CliRunner
+from psycopg.types.json import Jsonb
 from shapely.geometry import MultiPolygon, Point, box
 
 from tunneldb.arrays import Float
@@ -77,9 +78,9 @@ def save_example_structures(conn: psycopg.Connection, survey: str) -> None:
     its = get_survey(conn, survey, site=True)
     replace_structures(conn, its, example_structures(), None)
     conn.execute(
-        "INSERT INTO tunnel.run (survey_id, stage, outcome, parameters, started_at, finished_at)"
-        " VALUES (%s, 'members', 'done', tunnel_internal.members_inputs(%s), now(), now())",
-        [its.id, its.id],
+        "INSERT INTO tunnel.run (survey_id, stage, outcome, parameters, counts, started_at, finished_at)"
+        " VALUES (%s, 'members', 'done', tunnel_internal.members_inputs(%s), %s, now(), now())",
+        [its.id, its.id, Jsonb({"left_out": {"labels": 2, "bands": 0, "stray": 1}})],
     )
     conn.commit()
 

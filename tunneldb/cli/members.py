@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, cast, get_args
 
@@ -162,6 +163,7 @@ def _tell(found: FileMembers, output: Path | None) -> None:
         members=[member_row(member) for member in structures.members],
         faces=[face_row(face) for face in structures.faces],
         spots=[spot_row(spot) for spot in structures.spots],
+        left_out=asdict(structures.left_out),
         notes=found.notes,
         file=output,
     )
@@ -196,6 +198,8 @@ def _print(found: FileMembers) -> None:
     for count, why in left:
         if count:
             click.echo(f"{count} of {found.points} points {why} and were left out")
+    if structures.left_out.statement:
+        click.echo(structures.left_out.statement)
     if bimodal := [str(member.number) for member in structures.members if member.bimodal]:
         click.echo(f"more than half of member {', '.join(bimodal)} differs (bimodal): its own surface cannot be identified")
     for note in found.notes:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, cast
 
 import psycopg
@@ -71,6 +71,7 @@ def find_survey_members(conn: psycopg.Connection[Any], survey: Survey, begin: St
             members=len(structures.members),
             faces=len(structures.faces),
             spots=len(structures.spots),
+            left_out=asdict(structures.left_out),
             area=sum(face.area for face in structures.faces),
             seen_area=sum(face.area * face.seen_share for face in structures.faces),
         )

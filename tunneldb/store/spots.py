@@ -13,6 +13,7 @@ from shapely.geometry import Polygon
 
 from tunneldb.counted import counted
 from tunneldb.store.survey import Survey
+from tunneldb.structures.results import LeftOut
 
 Geometry = Literal["face", "map", "3d"]
 """Geometries: the face's own plane; the map; in space."""
@@ -88,7 +89,7 @@ class SpotList:
     face_area, seen_area : float
         Area of all faces, and inspected area, m².
     statement : str or None
-        Gaps of the inspection, if any.
+        Gaps of the inspection and regions left out, if any.
     searched : bool
         True if members were found in the current files with the current settings.
     """
@@ -146,12 +147,15 @@ def _coverage(
     row = conn.execute(
         """
         SELECT a.area, a.seen, a.unplaced,
-               (SELECT r.parameters @> tunnel_internal.members_inputs(s.id) FROM tunnel.run r
-                 WHERE r.survey_id = s.id AND r.stage = 'members' AND r.outcome = 'done' ORDER BY r.id DESC LIMIT 1),
+               r.current, r.left_out,
                (SELECT string_agg(m.number::text, ', ' ORDER BY m.number) FROM tunnel.member m
                  WHERE m.survey_id = s.id AND m.bimodal
                    AND (%(low)s::float8 IS NULL OR m.chainage BETWEEN %(low)s AND %(high)s))
           FROM tunnel.survey s
+          LEFT JOIN LATERAL (
+            SELECT r.parameters @> tunnel_internal.members_inputs(s.id) AS current, r.counts -> 'left_out' AS left_out
+              FROM tunnel.run r
+             WHERE r.survey_id = s.id AND r.stage = 'members' AND r.outcome = 'done' ORDER BY r.id DESC LIMIT 1) r ON true
          CROSS JOIN LATERAL (
             SELECT coalesce(sum(f.area) FILTER (WHERE t.inside), 0) AS area,
                    coalesce(sum(f.area * f.seen_share) FILTER (WHERE t.inside), 0) AS seen,
@@ -165,7 +169,7 @@ def _coverage(
         {"survey": survey.id, "low": low, "high": high},
     ).fetchone()
     assert row is not None
-    face_area, seen_area, unplaced, current, bimodal = row
+    face_area, seen_area, unplaced, current, left_out, bimodal = row
     if current is None:
         return 0.0, 0.0, f"members have not been searched for: tunneldb members {survey.name}", False
     said = []
@@ -176,6 +180,8 @@ def _coverage(
         said.append(f"{100 * share:.0f} % of the faces ({face_area - seen_area:.1f} m²) could not be inspected")
     if unplaced:
         said.append(f"{unplaced:.1f} m² of faces have no chainage, and are not in the stretch")
+    if left_out and (regions := LeftOut(**left_out).statement):  # of the whole survey: they have no place
+        said.append(regions if low is None else f"in the whole survey {regions}")
     if bimodal:
         said.append(f"more than half of member {bimodal} differs: its own surface cannot be identified")
     return face_area, seen_area, "; ".join(said) or None, current

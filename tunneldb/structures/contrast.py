@@ -114,7 +114,9 @@ def observe_face(layout: Layout, sums: Sums, face: int, stations: Float, referen
     return found
 
 
-def member_levels(parts: list[list[Observed]], model: Float, *, by_range: bool) -> dict[int, LevelCurve]:
+def member_levels(
+    parts: list[list[Observed]], model: Float, places: list[Int64] | None = None, *, by_range: bool
+) -> dict[int, LevelCurve]:
     """Return the level of a member's surface as each scan saw it: of all its faces, from the same places for all scans.
 
     If one scan saw more rust than paint, the others show which is which.
@@ -125,6 +127,9 @@ def member_levels(parts: list[list[Observed]], model: Float, *, by_range: bool) 
         Each face as the scans saw it.
     model : (WIDTH,) float array
         Model of the largest face.
+    places : list of int arrays, optional
+        Place on the surface of each pixel of each face: scans whose faces were not merged see the same places. Without it
+        each face has its own.
     by_range : bool
         True if levels depend on range.
     """
@@ -133,22 +138,32 @@ def member_levels(parts: list[list[Observed]], model: Float, *, by_range: bool) 
         for one in part:
             by_scan.setdefault(one.scan, []).append((face, one))
     points = {scan: sum(one.points.sum() for _, one in seen) for scan, seen in by_scan.items()}
-    known: dict[int, list[Int64]] = {}
+    known: dict[int, list[Int64]] = {}  # by face, or of the whole surface
     curves = {}
     for scan in sorted(by_scan, key=lambda scan: -points[scan]):
-        faces, seen = zip(*by_scan[scan], strict=True)
-        own = [np.isin(one.pixel, np.concatenate(known[face])) if face in known else np.zeros(len(one.pixel), np.bool_)
-               for face, one in by_scan[scan]]  # fmt: skip
-        curve = curves[scan] = curve_of(list(seen), model, np.concatenate(own), by_range=by_range)
-        for face, one in zip(faces, seen, strict=True):
+        seen = [one for _, one in by_scan[scan]]
+        at_places = [(face, one.pixel) if places is None else (-1, places[face][one.pixel]) for face, one in by_scan[scan]]
+        own = [np.isin(at, np.concatenate(known.get(face, [np.empty(0, np.int64)]))) for face, at in at_places]
+        curve = curves[scan] = curve_of(seen, model, np.concatenate(own), by_range=by_range)
+        for (face, at), one in zip(at_places, seen, strict=True):
             use = curve.known(one.angle)
             use[use] = curve.own(one.angle[use], one.range_m[use], one.value[use])
-            known.setdefault(face, []).append(one.pixel[use])
+            known.setdefault(face, []).append(at[use])
     return curves
 
 
-def face_level(curve: LevelCurve, one: Observed) -> LevelCurve:
-    """Return the level of a face: its member's, shifted by the face's offset; unshifted if the whole face is off."""
+def face_level(curve: LevelCurve, one: Observed, *, piece: bool = False) -> LevelCurve:
+    """Return the level of a face: its member's, shifted by the face's offset; unshifted if the whole face is off.
+
+    Parameters
+    ----------
+    curve : LevelCurve
+        Level of the member.
+    one : Observed
+        The face as a scan saw it.
+    piece : bool
+        True if the face is a piece of a rough wall: it has no material of its own, so a stain may cover it.
+    """
     use = np.flatnonzero(curve.known(one.angle))
     if one.points[use].sum() < MIN_LEVEL_POINTS:
         return curve
@@ -156,6 +171,8 @@ def face_level(curve: LevelCurve, one: Observed) -> LevelCurve:
     sigma = curve.sigmas(one.angle[use])
     own = np.abs(rest) < OWN * sigma
     if own.mean() < MIN_OWN_SHARE:
+        if piece:
+            return curve
         mode = robust_statistics(rest, SHORTH, two_sided=True)
         own = np.abs(rest - mode.mean) < OWN * sigma
         if own.mean() < UNIFORM:

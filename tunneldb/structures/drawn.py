@@ -7,7 +7,10 @@ several of the same width and contrast.
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import rasterio.features
@@ -16,6 +19,8 @@ from scipy import ndimage
 
 from tunneldb.arrays import Bool, Float, Single
 from tunneldb.robust import MAD_TO_SIGMA
+from tunneldb.structures.cuts import cuts_of
+from tunneldb.structures.results import LeftOut
 from tunneldb.structures.solidity import closed
 
 MAX_DEVIATION = 0.5
@@ -47,8 +52,14 @@ MIN_CORE = 9
 
 CORNERS = (3, 4)
 
+MAX_TURN_ERROR = 10.0
+"""Maximum deviation of the angles of a label from those of a rectangle or an equilateral triangle, degrees."""
+
 ROUNDS = 3
 """Number of fits of the sides."""
+
+Design = Literal["label", "band"]
+"""Kinds of drawn regions: a label or plate lies within its face; a band goes around a pipe or repeats."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +81,8 @@ class Patch:
         Standard deviation of a pixel of the surface, dB.
     blur : float
         Loss of contrast beside its edge: the sum of both sides, in the contrast within it.
+    cuts : int
+        Number of straight lines that cut it off its face; see `cuts`.
     """
 
     mask: Bool
@@ -80,6 +93,7 @@ class Patch:
     scatter: float
     sigma: float
     blur: float
+    cuts: int
 
     @property
     def stray(self) -> bool:
@@ -87,26 +101,45 @@ class Patch:
         return self.scatter >= abs(self.level)
 
 
-def drawn(patches: list[Patch]) -> list[bool]:
-    """Return which regions of a surface are drawn."""
+def drawn(patches: list[Patch]) -> list[Design | None]:
+    """Return the kind of each drawn region of a surface; None for the others."""
     found, widths = [], []
     for patch in patches:
-        straight, round_ = deviations(patch.mask)
+        straight, round_, regular = deviations(patch.mask)
         even = patch.scatter <= (MAX_SCATTER + 1.5 / np.sqrt(patch.mask.sum())) * patch.sigma
         clear = round_ >= max(MIN_ELLIPSE_RATIO * straight, MAX_DEVIATION)
-        within = patch.free >= MIN_FREE and patch.blur <= MAX_BLUR
-        around = patch.ring and patch.free >= MIN_FREE_OF_RING
-        found.append((straight <= MAX_DEVIATION and even, around or (clear and within)))
+        sharp = patch.blur <= MAX_BLUR
+        within = patch.free >= MIN_FREE and sharp and regular <= MAX_DEVIATION
+        around = patch.ring and sharp and (patch.cuts == 2 or (patch.free >= MIN_FREE_OF_RING and patch.cuts == 1))
+        if around:
+            straight = 0.0  # what hides a part of a ring leaves it another outline
+        alone: Design | None = "band" if around else "label" if clear and within else None
+        found.append((straight <= MAX_DEVIATION and even, alone))
         widths.append(_width(patch.mask))
-    out = []
+    out: list[Design | None] = []
     for one, width, (fits, alone) in zip(patches, widths, found, strict=True):
         like = sum(
             _alike(one, other, width, wide)
             for other, wide, (straight, _) in zip(patches, widths, found, strict=True)
             if straight
         )
-        out.append(fits and (alone or like >= MIN_REPEATED))
-    return out
+        out.append((alone or ("band" if like >= MIN_REPEATED else None)) if fits else None)
+    paint = [patch.level for patch, kind in zip(patches, out, strict=True) if kind == "band"]
+    return [
+        kind or ("band" if fits and _of_paint(patch.level, paint) else None)
+        for patch, kind, (fits, _) in zip(patches, out, found, strict=True)
+    ]
+
+
+def _of_paint(level: float, bands: list[float]) -> bool:
+    """Return True if a straight region has the contrast of several bands: a part of one, as at the end of a pipe."""
+    return sum(abs(level - other) <= ALIKE * max(abs(level), abs(other)) for other in bands) >= MIN_REPEATED
+
+
+def left_out(patches: Iterable[Patch], kinds: Iterable[Design | None]) -> LeftOut:
+    """Count regions that are drawn or stray."""
+    count = Counter(kind or ("stray" if patch.stray else None) for patch, kind in zip(patches, kinds, strict=True))
+    return LeftOut(count["label"], count["band"], count["stray"])
 
 
 def _width(mask: Bool) -> float:
@@ -159,17 +192,29 @@ def patch_of(
     free = float(within[outside].mean())
     edges = [value[side & known] for side in (rim, outside)]
     blur = 1.0 - float(np.median(edges[0]) - np.median(edges[1])) / level if level and all(map(len, edges)) else np.inf
-    return Patch(mask, pixel, free, ring, level, scatter, sigma, blur)
+    return Patch(mask, pixel, free, ring, level, scatter, sigma, blur, cuts_of(wide, within))
 
 
-def deviations(mask: Bool) -> tuple[float, float]:
-    """Return the mean deviation of a region's outline from the best triangle or quadrilateral, and from an ellipse, pixels."""
+def deviations(mask: Bool) -> tuple[float, float, float]:
+    """Return the mean deviation of a region's outline from three shapes, pixels.
+
+    The shapes are the best triangle or quadrilateral, an ellipse, and the best equilateral triangle or rectangle.
+    """
     filled = ndimage.binary_fill_holes(np.pad(mask, 1))
     parts = [shapely.geometry.shape(s) for s, _ in rasterio.features.shapes(filled.astype(np.uint8), mask=filled)]
     region = max(parts, key=lambda part: part.area)
-    shapes = [_fitted(region, corners) for corners in _corners(region)]
-    best = min((_deviation(region, one) for one in shapes if one is not None), default=np.inf)
-    return best, _deviation(region, _ellipse(filled))
+    shapes = [shape for corners in _corners(region) if (shape := _fitted(region, corners)) is not None]
+    best = min((_deviation(region, shape) for shape in shapes), default=np.inf)
+    regular = min((_deviation(region, shape) for shape in shapes if _is_regular(shape)), default=np.inf)
+    return best, _deviation(region, _ellipse(filled)), regular
+
+
+def _is_regular(shape: shapely.Polygon) -> bool:
+    """Return True if all angles are equal, as of plates and warning signs; flakes of paint have any angles."""
+    sides = np.diff(shapely.get_coordinates(shape), axis=0)
+    sides /= np.hypot(*sides.T)[:, None]
+    turn = np.degrees(np.arccos(np.clip(np.einsum("ni,ni->n", sides, np.roll(sides, -1, axis=0)), -1.0, 1.0)))
+    return bool(np.abs(turn - 360.0 / len(sides)).max() <= MAX_TURN_ERROR)
 
 
 def _deviation(region: shapely.Polygon, shape: shapely.Polygon) -> float:

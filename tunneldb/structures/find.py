@@ -13,15 +13,15 @@ from tunneldb.radiometry.reference_curve import ReferenceCurve
 from tunneldb.structures import profiles
 from tunneldb.structures.contrast import FaceContrast, contrast_of, face_level, member_levels, observe_face, some_pixels
 from tunneldb.structures.face_raster import Layout, Sums
-from tunneldb.structures.joining import Extent, RangeImages, coplanar, join
+from tunneldb.structures.joining import Extent, RangeImages, coplanar, is_rough, join
 from tunneldb.structures.level import UNKNOWN
-from tunneldb.structures.materials import parts_of_plane
+from tunneldb.structures.materials import Plane, parts_of_plane
 from tunneldb.structures.models import AXIS, POINT, RADIUS, unroll
-from tunneldb.structures.results import Face, Member, MemberKind, Spot, Structures, kind_of, outline_of
+from tunneldb.structures.results import Face, LeftOut, Member, MemberKind, Spot, Structures, kind_of, outline_of
 from tunneldb.structures.segmentation import Segmentation
 from tunneldb.structures.significance import Scatter
 from tunneldb.structures.solidity import closed, ray_densities, solid_faces
-from tunneldb.structures.spots import BIMODAL, FaceSpots, find_spots, without_design
+from tunneldb.structures.spots import BIMODAL, FaceSpots, extended, find_spots, without_design
 
 MIN_FACE_AREA = 0.002
 """Minimum area of a face, m²."""
@@ -105,9 +105,10 @@ def find_structures(
     faces: list[Face] = []
     spots: list[Spot] = []
     face_number, member_number = np.zeros(count + 1, np.int32), np.zeros(count + 1, np.int32)
-    pixels, scatter = int(np.count_nonzero(sums.count)), Scatter()
+    pixels, scatter, omitted = int(np.count_nonzero(sums.count)), Scatter(), LeftOut()
     for number, side, surface in zip(member_of.tolist(), side_of, surfaces, strict=True):
-        judged = _judge(found, sums, surface, reference, pixels, scatter, by_range=by_range)
+        judged, design = _judge(found, sums, surface, reference, pixels, scatter, by_range=by_range)
+        omitted += design
         for part, (contrast, here) in zip(surface, judged, strict=True):
             faces.append(_face(found, part, len(faces) + 1, number, side, contrast, here))
             face_number[part.face], member_number[part.face] = len(faces), number
@@ -129,7 +130,7 @@ def find_structures(
                 for place, spot in enumerate(here.spots, start=1)
             ]  # fmt: skip
     members = _members(faces, member_of, extents, found.origin)
-    return Found(Structures(members, faces, spots), face_number, member_number, places, anomaly)
+    return Found(Structures(members, faces, spots, omitted), face_number, member_number, places, anomaly)
 
 
 @dataclass(frozen=True)
@@ -160,7 +161,7 @@ def _parts(found: Segmentation, sums: Sums, images: RangeImages, reference: Refe
         points, scans = _points(layout, sums, face)
         columns, rows = layout.shape[face, 2:]
         points = points.reshape(rows, columns)
-        extent = _extent(layout, face, points, scans)
+        extent = _extent(layout, face, points, scans, float(found.faces.rms[face]))
         if extent is not None:
             held[face], extents[face] = points, extent
             seen = observe_face(layout, sums, face, found.stations, reference)
@@ -181,7 +182,7 @@ def _parts(found: Segmentation, sums: Sums, images: RangeImages, reference: Refe
             of = material.reshape(held[face].shape)
             for which in np.unique(of[held[face] > 0]).tolist():
                 inside = of == which
-                own = _extent(layout, face, np.where(inside, held[face], 0), extents[face].scans)
+                own = _extent(layout, face, np.where(inside, held[face], 0), extents[face].scans, extents[face].rms)
                 if own is not None:
                     parts[face].append(_Part(face, inside, own, (joined[face], which)))
     return sorted((part for of in parts.values() for part in of), key=lambda part: -part.extent.points)
@@ -212,7 +213,7 @@ def _planes(extents: dict[int, Extent], noise: float) -> list[list[int]]:
     return [[flat[k] for k in np.flatnonzero(label == number).tolist()] for number in np.unique(label).tolist()]
 
 
-def _extent(layout: Layout, face: int, held: Int64, scans: tuple[int, ...]) -> Extent | None:
+def _extent(layout: Layout, face: int, held: Int64, scans: tuple[int, ...], rms: float) -> Extent | None:
     """Return the extent of a face from the points in its pixels; None if there is none."""
     occupied = held > 0
     if not occupied.any():
@@ -227,7 +228,7 @@ def _extent(layout: Layout, face: int, held: Int64, scans: tuple[int, ...]) -> E
         return None
     if 2.0 * area / max(outline.length, 1e-9) < MIN_FACE_WIDTH * side:
         return None
-    return Extent(layout.models[face], outline, side, scans, float(held.sum()))
+    return Extent(layout.models[face], outline, side, scans, float(held.sum()), rms)
 
 
 def _points(layout: Layout, sums: Sums, face: int) -> tuple[Int64, tuple[int, ...]]:
@@ -251,8 +252,8 @@ def _judge(
     scatter: Scatter,
     *,
     by_range: bool,
-) -> list[tuple[FaceContrast, FaceSpots]]:
-    """Compute contrast and spots of the faces of a member.
+) -> tuple[list[tuple[FaceContrast, FaceSpots]], LeftOut]:
+    """Compute contrast and spots of the faces of a member, and count the regions that are left out.
 
     If there are spots the level is found again without them, because they distort it.
     """
@@ -262,21 +263,24 @@ def _judge(
         seen_by = observe_face(layout, sums, part.face, found.stations, reference)
         observed.append(seen_by if part.inside is None else some_pixels(seen_by, part.inside))
     out: list[tuple[FaceContrast, FaceSpots]] = []
-    bare = observed
+    bare, omitted = observed, LeftOut()
+    places = Plane.of(layout, [part.face for part in parts]).place if len(parts) > 1 else None
     for turn in range(TURNS):
-        levels = member_levels(bare, layout.models[parts[0].face], by_range=by_range)
+        levels = member_levels(bare, layout.models[parts[0].face], places, by_range=by_range)
         before, out = scatter.copy(), []
         for part, seen, rest in zip(parts, observed, bare, strict=True):
-            own = {one.scan: face_level(levels[one.scan], one) for one in rest}
+            piece = len(parts) > 1 and is_rough(part.extent, found.noise)
+            own = {one.scan: face_level(levels[one.scan], one, piece=piece) for one in rest}
             curves = [own.get(one.scan, levels.get(one.scan, UNKNOWN)) for one in seen]
             contrast = contrast_of(layout, part.face, seen, curves, found.noise)
             out.append((contrast, find_spots(contrast, pixels, scatter)))
-        out = without_design(out, pipe=bool(layout.models[parts[0].face][RADIUS] > 0.0))
+        out, omitted = without_design(out, pipe=bool(layout.models[parts[0].face][RADIUS] > 0.0))
+        out = [(contrast, extended(contrast, spots)) for contrast, spots in out]
         if turn == TURNS - 1 or not any(spots.spots for _, spots in out):
             break
         scatter.restore(before)
         bare = [some_pixels(seen, ~_about(spots.numbers > 0)) for seen, (_, spots) in zip(observed, out, strict=True)]
-    return out
+    return out, omitted
 
 
 def _about(spots: Bool) -> Bool:

@@ -103,6 +103,8 @@ class Extent:
     scans : tuple of int
         Scans that saw it.
     points : float
+    rms : float
+        Distance of its points from the model, m.
     """
 
     model: Float
@@ -110,6 +112,7 @@ class Extent:
     pixel: float
     scans: tuple[int, ...]
     points: float
+    rms: float = 0.0
 
 
 def join(faces: list[Extent], images: RangeImages, noise: float) -> Int64:
@@ -126,7 +129,7 @@ def join(faces: list[Extent], images: RangeImages, noise: float) -> Int64:
     found = DisjointSet(range(len(faces)))
     rims = [_rims(face.outline, face.pixel) if face.model[RADIUS] == 0.0 else np.empty((0, 5)) for face in faces]
     for a, b in coplanar(faces, noise):
-        if not found.connected(a, b) and _joined(faces[a], faces[b], rims[a], rims[b], images):
+        if not found.connected(a, b) and _joined(faces[a], faces[b], rims[a], rims[b], images, noise):
             found.merge(a, b)
     return numbered(found)
 
@@ -143,13 +146,13 @@ def coplanar(faces: list[Extent], noise: float) -> list[tuple[int, int]]:
     """Pair faces on one plane or cylinder (3.2.1): the smaller is on the surface of the larger."""
     if not faces:
         return []
-    apart = max(MAX_DISTANCE_IN_SCAN, 3.0 * noise)
     models = np.array([face.model for face in faces])
     places = [_corners(face) for face in faces]
     middles = np.array([at.mean(axis=0) for at in places])
     least, found = math.cos(math.radians(ANGLE)), []
     for a in range(len(faces)):
         one = models[a]
+        apart = max(MAX_DISTANCE_IN_SCAN, 3.0 * noise, 3.0 * faces[a].rms if is_rough(faces[a], noise) else 0.0)
         alike = (models[:, RADIUS] > 0.0) == (one[RADIUS] > 0.0)
         alike[: a + 1] = False
         turn = models[:, AXIS] @ one[AXIS]
@@ -174,10 +177,12 @@ def _corners(face: Extent) -> Float:
     return to_space(face.model, at[:, 0], at[:, 1])
 
 
-def _joined(one: Extent, other: Extent, rims: Float, others: Float, images: RangeImages) -> bool:
+def _joined(one: Extent, other: Extent, rims: Float, others: Float, images: RangeImages, noise: float) -> bool:
     """Return True if only objects in front separate two faces of one surface, given their rims."""
     common: list[Float] = []
     pixel = max(one.pixel, other.pixel)
+    if _continued(one, other, pixel, noise):
+        return True
     if one.model[RADIUS] == 0.0:
         common = _common_rims(rims, _rims_on(one.model, other.model, others), pixel)
         if not common:
@@ -188,6 +193,20 @@ def _joined(one: Extent, other: Extent, rims: Float, others: Float, images: Rang
     if len(common) == 1 and _gap_along(common[0], one.outline, moved) > _longest_gap(one, other, pixel):
         return False
     return _occluded(one, moved, set(one.scans) | set(other.scans), images)
+
+
+def is_rough(face: Extent, noise: float) -> bool:
+    """Return True for a plane whose relief exceeds the noise, as masonry."""
+    return bool(face.model[RADIUS] == 0.0 and face.rms > noise)
+
+
+def _continued(one: Extent, other: Extent, pixel: float, noise: float) -> bool:
+    """Return True if two rough planes touch: the relief of stones divides their wall along ragged lines, without rims."""
+    return (
+        is_rough(one, noise)
+        and is_rough(other, noise)
+        and bool(shapely.dwithin(one.outline, _unrolled_on(one, other), COMMON_APART * pixel))
+    )
 
 
 def _longest_gap(one: Extent, other: Extent, pixel: float) -> float:

@@ -165,7 +165,10 @@ def level_curve(
     told = own[taken] if own is not None else np.zeros(len(value), np.bool_)
     if points[told].sum() < MIN_LEVEL_POINTS:
         told = np.ones(len(value), np.bool_)
-    found = _shape(basis, value, weight, pairs[told[pairs].all(axis=1)])
+    clear = told[pairs].all(axis=1)
+    enough = np.bincount(basis.first[pairs[clear, 0]], minlength=len(knots)) >= MIN_LEVEL_POINTS
+    # The other scan may know pixels of few incidences; elsewhere all pairs show the shape.
+    found = _shape(basis, value, weight, pairs[clear | ~enough[basis.first[pairs[:, 0]]]])
     start = robust_statistics((value - basis(found))[told], SHORTH, two_sided=True)
     found[: len(knots)] += start.mean
     spread = max(start.sigma, MIN_SIGMA)

@@ -12,6 +12,7 @@ from affine import Affine
 from shapely.geometry import MultiPolygon, Polygon
 
 from tunneldb.arrays import Bool, Float
+from tunneldb.counted import counted
 from tunneldb.structures.models import RADIUS, to_space
 
 SIMPLIFY = 0.75
@@ -176,12 +177,40 @@ class Spot:
 
 
 @dataclass(frozen=True)
+class LeftOut:
+    """Numbers of regions that differ from their surface and are no spots.
+
+    Attributes
+    ----------
+    labels, bands : int
+        Drawn regions: labels and plates; bands around pipes, and stripes.
+    stray : int
+        Regions of stray points of other objects.
+    """
+
+    labels: int = 0
+    bands: int = 0
+    stray: int = 0
+
+    def __add__(self, other: LeftOut) -> LeftOut:
+        return LeftOut(self.labels + other.labels, self.bands + other.bands, self.stray + other.stray)
+
+    @property
+    def statement(self) -> str | None:
+        """Sentence about these regions; None if there are none."""
+        counts = ((self.labels, "label"), (self.bands, "painted band"), (self.stray, "region of stray points"))
+        texts = [counted(count, one, "regions of stray points" if "stray" in one else "") for count, one in counts if count]
+        return f"{', '.join(texts)} left out: they differ from their surface but are no spots" if texts else None
+
+
+@dataclass(frozen=True)
 class Structures:
-    """All that is found."""
+    """All that is found, and the numbers of regions that were left out."""
 
     members: list[Member]
     faces: list[Face]
     spots: list[Spot]
+    left_out: LeftOut = LeftOut()
 
 
 def outline_of(mask: Bool, left: int, bottom: int, pixel: float) -> MultiPolygon:

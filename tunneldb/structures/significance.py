@@ -70,8 +70,8 @@ def limit(pixels: int, window: int) -> float:
     return -float(ndtri(min(ALARMS * window**2 / max(pixels, 1), 0.01)))
 
 
-def significance(drop: Single, judged: Bool, sigma: Single, pixels: int, scatter: Scatter) -> Single:
-    """Return the mean of the most different window around each pixel over the chance limit: significant from 1 on.
+def significance(drop: Single, judged: Bool, sigma: Single, pixels: int, scatter: Scatter) -> tuple[Single, Single]:
+    """Compare the means of windows around each pixel with their scatter.
 
     Parameters
     ----------
@@ -87,10 +87,12 @@ def significance(drop: Single, judged: Bool, sigma: Single, pixels: int, scatter
 
     Returns
     -------
-    (rows, columns) float32 array
-        Signed as the darkening.
+    ratio, broad : (rows, columns) float32 arrays
+        Mean of the most different window over the chance limit, significant from 1 on; mean of the largest window, in
+        standard deviations. Signed as the darkening.
     """
-    most = np.zeros(drop.shape, np.float32)
+    most: Single = np.zeros(drop.shape, np.float32)
+    broad: Single = np.zeros(drop.shape, np.float32)
     count = judged.astype(np.float32)
     ratio = np.where(judged, drop / np.maximum(sigma, 1e-3), np.float32(0.0)).astype(np.float32)
     usual = float(np.median(sigma[judged])) if judged.any() else 1.0
@@ -107,6 +109,7 @@ def significance(drop: Single, judged: Bool, sigma: Single, pixels: int, scatter
         own = robust_statistics(whole[::step], SHORTH, two_sided=True).sigma
         wide = scatter.blended(window, own, len(whole) / window**2)
         wide = float(np.hypot(wide, LEVEL_SIGMA / max(usual, 1e-3)))
-        scaled = mean / np.float32(wide * limit(pixels, window))
+        broad = np.asarray(mean / np.float32(wide), np.float32)
+        scaled = broad / np.float32(limit(pixels, window))
         most = np.where(np.abs(scaled) > np.abs(most), scaled, most)
-    return most
+    return most, broad

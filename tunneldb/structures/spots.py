@@ -18,8 +18,9 @@ from tunneldb.arrays import Bool, Int32, Single
 from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.state import PixelState
 from tunneldb.structures.contrast import FaceContrast
-from tunneldb.structures.drawn import drawn, patch_of
+from tunneldb.structures.drawn import drawn, left_out, patch_of
 from tunneldb.structures.face_raster import STEP
+from tunneldb.structures.results import LeftOut
 from tunneldb.structures.significance import Scatter, significance
 
 MIN_SPOT_AREA = 0.0016
@@ -34,8 +35,16 @@ MIN_FACE_POINTS = 150
 RIM = 0.75
 """Share of a region along the face's own edge from which it is an effect of the beam there."""
 
+SPREAD = 3.0
+"""Standard deviations from which windows beside a spot belong to it (Ono et al., 3.4): few are tested there."""
+
+SMOOTHED = 5
+"""Side of the window whose mean must exceed half of the contrast of a spot to belong to it, pixels."""
+
 BIMODAL = 0.5
 """Share of the surface that differs from which it is uncertain which part is the surface itself."""
+
+_KINDS: tuple[tuple[Literal["dark", "bright"], int], ...] = (("dark", 1), ("bright", -1))
 
 _REASONS = ("thin", "gradual", "rectangular")
 
@@ -72,6 +81,8 @@ class FaceSpots:
         Pixels that are known to differ or not: with contrast, or with enough contrast around them.
     size : int
         Size of the median filter, pixels.
+    ratio, broad : (rows, columns) float32 arrays or None
+        Significance, rows downwards; see `significance`.
     """
 
     spots: list[FoundSpot]
@@ -79,6 +90,8 @@ class FaceSpots:
     share: float
     seen: int
     size: int = 1
+    ratio: Single | None = None
+    broad: Single | None = None
 
 
 def find_spots(face: FaceContrast, pixels: int, scatter: Scatter) -> FaceSpots:
@@ -98,29 +111,61 @@ def find_spots(face: FaceContrast, pixels: int, scatter: Scatter) -> FaceSpots:
         return FaceSpots([], numbers, 0.0, 0)
     has_contrast = face.image.state == PixelState.LINING
     drop = np.where(has_contrast, face.image.drop, np.int16(0)) * np.float32(STEP)
-    limit_ratio = significance(drop, has_contrast, face.image.sigma, pixels, scatter)
-    on_face = face.image.state != PixelState.OFF
+    ratio, broad = significance(drop, has_contrast, face.image.sigma, pixels, scatter)
     empty = int((face.image.state == PixelState.EMPTY).sum())
     size = filter_size(judged / (judged + empty))
-    rim = face.face & ~ndimage.binary_erosion(face.face, np.ones((3, 3), np.bool_), iterations=2)
+    found = [spot for kind, sign in _KINDS for spot in _outlined(face, kind, sign * ratio > 1.0, ratio, size)]
+    return numbered(face, found, size, ratio, broad)
+
+
+def extended(face: FaceContrast, spots: FaceSpots) -> FaceSpots:
+    """Extend the spots of a face to what differs around them, and combine those that are then connected.
+
+    The limit of a whole structure finds a weak spot only where it is strongest. Beside a spot few windows are tested.
+    """
+    if not spots.spots or spots.ratio is None or spots.broad is None:
+        return spots
     found: list[FoundSpot] = []
-    kinds: tuple[tuple[Literal["dark", "bright"], int], ...] = (("dark", 1), ("bright", -1))
-    for kind, sign in kinds:
-        image = face.image
-        if sign < 0:
-            image = replace(image, drop=np.where(image.drop == NODATA, np.int16(NODATA), -image.drop).astype(np.int16))
-        marked = (sign * limit_ratio > 1.0) & on_face
-        if not marked.any():
-            continue
-        marked = refine_boundary(marked, image, size)
-        for region in find_regions(marked, marked, image, MIN_SPOT_AREA, None):
-            spot = _judge(region, kind, face, sign * limit_ratio[::-1], rim)
-            if spot is not None:
-                found.append(spot)
-    return numbered(face, found, size)
+    smooth = _smooth(face)
+    for kind, sign in _KINDS:
+        of_kind = [spot for spot in spots.spots if spot.kind == kind]
+        seeds, marked = np.zeros(face.face.shape, np.bool_), np.zeros(face.face.shape, np.bool_)
+        for spot in of_kind:
+            seed = np.zeros(face.face.shape, np.bool_)
+            seed[_box(spot)] = spot.mask
+            beside = (sign * spots.broad > SPREAD) & (sign * smooth > 0.5 * spot.difference)
+            marked |= ndimage.binary_propagation(seed, mask=seed | beside[::-1])
+            seeds |= seed
+        wider = _outlined(face, kind, marked[::-1], spots.ratio, spots.size)
+        found += [spot for spot in wider if (seeds[_box(spot)] & spot.mask).any()]
+    return numbered(face, found, spots.size, spots.ratio, spots.broad)
 
 
-def numbered(face: FaceContrast, found: list[FoundSpot], size: int) -> FaceSpots:
+def _smooth(face: FaceContrast) -> Single:
+    """Return the mean contrast about each pixel, dB, rows downwards."""
+    has_contrast = face.image.state == PixelState.LINING
+    drop = np.where(has_contrast, face.image.drop, np.int16(0)) * np.float32(STEP)
+    count = ndimage.uniform_filter(has_contrast.astype(np.float32), SMOOTHED, mode="constant")
+    return np.asarray(ndimage.uniform_filter(drop, SMOOTHED, mode="constant") / np.maximum(count, 1e-3))
+
+
+def _outlined(face: FaceContrast, kind: Literal["dark", "bright"], marked: Bool, ratio: Single, size: int) -> list[FoundSpot]:
+    """Return the spots of a kind from the pixels (rows downwards) that differ."""
+    marked = marked & (face.image.state != PixelState.OFF)
+    if not marked.any():
+        return []
+    image = face.image
+    if kind == "bright":
+        image = replace(image, drop=np.where(image.drop == NODATA, np.int16(NODATA), -image.drop).astype(np.int16))
+        ratio = -ratio
+    marked = refine_boundary(marked, image, size)
+    rim = face.face & ~ndimage.binary_erosion(face.face, np.ones((3, 3), np.bool_), iterations=2)
+    regions = find_regions(marked, marked, image, MIN_SPOT_AREA, None)
+    judged = [_judge(region, kind, face, ratio[::-1], rim) for region in regions]
+    return [spot for spot in judged if spot is not None]
+
+
+def numbered(face: FaceContrast, found: list[FoundSpot], size: int, ratio: Single | None, broad: Single | None) -> FaceSpots:
     """Write the numbers of the spots of a face into its pixels."""
     numbers = np.zeros(face.face.shape, np.int32)
     for number, spot in enumerate(found, start=1):
@@ -129,22 +174,26 @@ def numbered(face: FaceContrast, found: list[FoundSpot], size: int) -> FaceSpots
     _over_rim(face, numbers, found)
     share = float((numbers[face.judged] > 0).mean())
     seen = sum(int(np.count_nonzero(part)) for _, part in seen_lining(face.image.state, size))
-    return FaceSpots(found, numbers, share, seen, size)
+    return FaceSpots(found, numbers, share, seen, size, ratio, broad)
 
 
-def without_design(faces: list[tuple[FaceContrast, FaceSpots]], *, pipe: bool) -> list[tuple[FaceContrast, FaceSpots]]:
-    """Leave out the drawn regions of the faces of a surface, and stray points."""
+def without_design(
+    faces: list[tuple[FaceContrast, FaceSpots]], *, pipe: bool
+) -> tuple[list[tuple[FaceContrast, FaceSpots]], LeftOut]:
+    """Leave out the drawn regions of the faces of a surface, and stray points; count them."""
     patches = []
     for face, spots in faces:
         drop = np.where(face.judged, face.image.drop[::-1], np.int16(0)) * np.float32(STEP)
         pixel = face.image.grid.pixel
         patches += [patch_of(spot.mask, spot.corner, pixel, drop, face.judged, face.sigma, pipe=pipe) for spot in spots.spots]
-    kept = iter([not design and not patch.stray for patch, design in zip(patches, drawn(patches), strict=True)])
+    kinds = drawn(patches)
+    kept = iter([kind is None and not patch.stray for patch, kind in zip(patches, kinds, strict=True)])
     out = []
     for face, spots in faces:
         rest = [spot for spot in spots.spots if next(kept)]
-        out.append((face, spots if len(rest) == len(spots.spots) else numbered(face, rest, spots.size)))
-    return out
+        same = len(rest) == len(spots.spots)
+        out.append((face, spots if same else numbered(face, rest, spots.size, spots.ratio, spots.broad)))
+    return out, left_out(patches, kinds)
 
 
 def _judge(

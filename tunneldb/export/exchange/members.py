@@ -47,7 +47,8 @@ def write_members(path: Path, found: Structures, crs: CRS | None, geometry: Geom
     form = "MultiPolygon Z" if geometry == "3d" else "MultiPolygon"
     _write(path, "member", [member_row(member) for member in found.members], members, crs, _MEMBER.format(where), form)
     _write(path, "face", [face_row(face) for face in found.faces], list(shapes.values()), crs, _FACE.format(where), form)
-    _write(path, "spot", [spot_row(spot) for spot in found.spots], spots, crs, _SPOT.format(where), form)
+    note = ". ".join(filter(None, [_SPOT.format(where), found.left_out.statement]))
+    _write(path, "spot", [spot_row(spot) for spot in found.spots], spots, crs, note, form)
     return {"member": len(members), "face": len(shapes), "spot": len(spots)}
 
 
