@@ -24,6 +24,7 @@ BEAM_SIGMA = BEAM / np.sqrt(12.0)  # an echo comes from anywhere in the beam
 BEAM_SPREAD = BEAM / np.sqrt(8.0 * np.log(2.0))  # of its power, assumed normally distributed
 STRETCH = 2.0  # m of wall or bed: its relief is the same for all scans
 SHARED = 0.002  # m: common error of a stretch of wall or bed, by relief and slanting beams
+BATTER_SHARED = 0.01  # tangent: batter of a stretch below the water against the rest of its side
 BARS_BEAMS = 4.0  # beams across a bar whose errors are independent: beams that hit it overlap
 WATERLINE_NOISE = 0.025  # m, of upper edges of walls: half a bin, and half of the rest of half a beam
 WATERLINE_SHARED = 0.01  # m
@@ -249,6 +250,7 @@ def wall_rows(
         + walls.sigma[piece] ** 2
         + (walls.sigma_batter[piece] * centre[:, 2]) ** 2
     )
+    shared = np.hypot(SHARED, BATTER_SHARED * centre[:, 2])
     batter = centre[:, 2] / np.sqrt(1.0 + walls.batter[piece] ** 2)
     facing_course = np.column_stack([walls.course[piece], walls.batter[piece]])
     facing_course /= np.linalg.norm(facing_course, axis=1)[:, None]
@@ -263,7 +265,7 @@ def wall_rows(
             out.append(
                 Rows(
                     off[rows] - zero - slant * nearer[rows], sigma[rows], moves, scan, None, None, design,
-                    columns[[side, 2, 3]], stretch[rows], np.full(int(rows.sum()), SHARED), "wall", "left" if side else "right",
+                    columns[[side, 2, 3]], stretch[rows], shared[rows], "wall", "left" if side else "right",
                 )
             )  # fmt: skip
     return out
