@@ -305,7 +305,8 @@ def profile_rows(patches: Patches, pose: Pose, walls: Walls, scan: int, columns:
     sigma = np.sqrt(patches.spread[near] ** 2 / patches.count[near] + RELIEF**2 + PROFILE_NOISE**2)
     shared = np.hypot(PROFILE_SHARED, profile.sigma(centre[:, 2]))
     upright_normal = np.column_stack([normal, np.zeros(len(normal))])
-    group = cell_keys(centre * [1.0, 1.0, 0.0], PROFILE_STRETCH)
+    lumps = profile.growth > PROFILE_SHARED  # rock, whose forms are longer than a pier or a recess
+    group = cell_keys(centre * [1.0, 1.0, 0.0], STRETCH if lumps else PROFILE_STRETCH)
     _, number, count = np.unique(group, return_inverse=True, return_counts=True)
     scatter = np.hypot(sigma, shared)
     sigma = np.hypot(sigma, np.sqrt(count[number]) * shared)  # a group weighs as one observation of this accuracy

@@ -20,7 +20,7 @@ MIN_POINTS, MIN_HEIGHT = 3, 0.08  # of a cell; m between its lowest and highest 
 NORMAL_RADIUS, NORMAL_CELLS = 4.0, 4  # of the cells that give a normal, in cells; their least number
 MAX_FLATNESS = 0.35  # ratio of the spreads across and along
 UPPER_FOOT, UPPER_HEAD = 0.5, 0.8  # heights, m, of the points that show how the plan changes with height
-STRETCH = 1.0  # m of wall that may have one batter
+STRETCH = 4.0  # m of wall that may have one batter; lumps of rock are shorter
 MAX_CHANGE = 0.4  # m
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -45,6 +45,7 @@ MISSED_LOG_ODDS = float(np.log(0.05))  # of a pose at which a ladder in sight is
 MAX_LEVEL_POINTS = 150  # of the water's surface that are used
 MIN_PLAN_SCORE = 0.15  # least weighted share of a scan's walls that match the laser's plan
 MAX_SLIDE = 1.0  # m by which a fit may move a candidate
+SLIDES = np.arange(-0.5, 0.51, 0.04)  # m along a wall, to see a ladder
 
 
 @dataclass(frozen=True)
@@ -232,10 +233,28 @@ def _fit_to_plan(scan: PreparedScan, patches: Patches, pose: Pose, walls: Walls,
     """Fit a candidate from the plan, first without ladders, then with those that it sees."""
     pose = _fit(Scan(patches, scan.smooth, scan.columns, scan.level, pose, {}), walls, found, FIRST_REACHES)
     seen = _seen(scan, pose, found)
+    if seen.missed and not seen.ladders:
+        seen = _seen(scan, _slid_to_ladder(scan, pose, found), found)
     if not seen.ladders:
-        return seen
-    with_ladders = scan_of(scan.thin, patches, scan.smooth, scan.columns, scan.level, pose, seen.ladders, found)
+        return _seen(scan, pose, found)
+    with_ladders = scan_of(scan.thin, patches, scan.smooth, scan.columns, scan.level, seen.pose, seen.ladders, found)
     return _seen(scan, _fit(with_ladders, walls, found, FIRST_REACHES[-3:]), found)
+
+
+def _slid_to_ladder(scan: PreparedScan, pose: Pose, found: Sequence[LaserLadder]) -> Pose:
+    """Return the pose moved along the wall to where a ladder in sight is seen best: the plan may not determine that."""
+    space = pose.apply(scan.thin)
+    best, moved = MIN_LIKENESS, pose
+    for k in _near(pose, found):
+        placed = found[k].placed
+        own = placed.to_ladder(space)
+        mine = (np.abs(own[:, 0]) < placed.gap / 2.0 + 2.0 * SLIDES[-1]) & (np.abs(own[:, 2]) < SLIDES[-1])
+        for slide in SLIDES:
+            shift = slide * placed.axes[0] * [1.0, 1.0, 0.0]
+            like = likeness(space[mine] + shift, pose.translation + shift, placed)
+            if like > best:
+                best, moved = like, replace(pose, translation=pose.translation + shift)
+    return moved
 
 
 def _fit(scan: Scan, walls: Walls, found: Sequence[LaserLadder], reaches: Sequence[float]) -> Pose:

@@ -64,8 +64,11 @@ def find_first_poses(
     started = {}
     for i, some in options.items():
         best = int(np.argmax(likely[i]))
+        on_rock = bool(walls.rough.all()) and not some[best].ladders
         if likely[i][best] < MIN_PROBABILITY:
             reasons[i] = "several poses fit; choose one by --start"
+        elif on_rock and scans[i].cloud.near is None:
+            reasons[i] = "walls of rock have another plan below the water, and it sees no ladder; choose a pose by --start"
         else:
             started[i] = some[best]
     started = _agreeing(reliefs, started, reasons, walls, unseen=unseen)
