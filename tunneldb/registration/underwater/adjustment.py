@@ -174,12 +174,10 @@ def fit(
     pairs: Sequence[tuple[int, int]],
     reaches: Sequence[float],
     fixed: int = 0,
-    *,
-    hold_height: bool = False,
 ) -> Fitted:
     """Fit scans to walls, ladders and each other, within decreasing distances, round by round.
 
-    The first ``fixed`` scans are fixed; the next keeps its height if ``hold_height`` is set.
+    The first ``fixed`` scans are fixed.
     """
     poses = [scan.pose for scan in scans]
     placed = [ladder.placed for ladder in ladders]
@@ -193,7 +191,7 @@ def fit(
     plan = np.add.outer(POSE * np.arange(len(scans)), [3, 4]).ravel()
     damping = np.zeros((count, count))
     damping[plan, plan] = 1.0 / MAX_DRIFT**2
-    stay = np.append(np.arange(POSE * fixed), [POSE * fixed + 5] if hold_height else []).astype(np.int64)
+    stay = np.arange(POSE * fixed)
     normal, rows = np.eye(count), []
     for reach in reaches:
         leaning = replace(walls, batter=walls.batter + common[walls.side])

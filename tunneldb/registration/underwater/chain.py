@@ -152,7 +152,7 @@ def _fitted_to_neighbours(own: Scan, others: Sequence[Scan], walls: Walls, direc
 
     def fitted(start: Pose, reaches: Sequence[float]) -> Pose:
         free = replace(own, pose=start)
-        return fit([*others, free], walls, (), pairs, reaches, len(others), hold_height=_shows_waterline(own)).poses[-1]
+        return fit([*others, free], walls, (), pairs, reaches, len(others)).poses[-1]
 
     def likelihood(one: Pose) -> float:
         rough = _roughness(own.smooth, one, direction)
@@ -167,7 +167,7 @@ def _fitted_to_neighbours(own: Scan, others: Sequence[Scan], walls: Walls, direc
     return found, likelihood(found)
 
 
-def _shows_waterline(scan: PreparedScan | Scan) -> bool:
+def _shows_waterline(scan: PreparedScan) -> bool:
     """Return True if it shows the water's level: that is level, while errors of slope accumulate."""
     return len(scan.level.points) >= MIN_LEVEL_POINTS
 
@@ -175,7 +175,8 @@ def _shows_waterline(scan: PreparedScan | Scan) -> bool:
 def _levelled(scan: PreparedScan, pose: Pose) -> Scan:
     """Return the scan without ladders, at the height given by the water."""
     if _shows_waterline(scan):
-        pose = replace(pose, translation=np.array([*pose.translation[:2], -scan.flat.top]))
+        over = float(np.median(pose.apply(scan.level.points)[:, 2]))
+        pose = replace(pose, translation=pose.translation - [0.0, 0.0, over])
     return Scan(scan.patches, scan.smooth, scan.columns, scan.level, pose, {})
 
 
