@@ -46,7 +46,8 @@ class Evidence:
 def explained(points: Float, upright: Bool, pose: Pose, walls: Walls, ladders: Sequence[PlacedLadder]) -> Evidence:
     """Return the evidence of points (n, 3), file's axes, for a pose.
 
-    ``upright`` (n,) is True on upright surfaces: where the laser shows the canal but no wall there, they speak against it.
+    ``upright`` (n,) is True on upright surfaces. Where the laser shows the canal but no wall there, they are evidence against
+    the pose.
     """
     space = pose.apply(points)
     reach = np.linalg.norm(space - pose.translation, axis=1)
