@@ -198,6 +198,36 @@ def test_speed_of_sound_and_place_may_be_told(
         assert said in command("register", NAME, slow, *how, "--start", start, code=2).stderr
 
 
+def test_possible_poses_are_listed_pictured_and_chosen(
+    canal: tuple[Path, list[Sonar]], conn: psycopg.Connection, tmp_path: Path
+) -> None:
+    folder, scans = canal
+    how = ["--up", "+z", "--water-level", LEVEL]
+    told = command("register", NAME, folder / "s0.xyz", *how, "--pictures", tmp_path, "--json", code=1)
+    (scan,) = json.loads(told.stdout)["scans"]
+    choices = scan["alternatives"]
+    assert (scan["state"], scan["undetermined"]) == ("undetermined", ["along the tunnel"])
+    likely = [one["probability"] for one in choices]
+    assert len(likely) > 1
+    assert likely == sorted(likely, reverse=True)
+    assert sum(likely) <= 1.0 + 1e-9
+    across = scans[0].to_tunnel(np.eye(3))[0] - scans[0].translation  # without a ladder only the place along is open
+    for one in choices:
+        assert np.array(one["rotation"])[:, 0] @ across / np.linalg.norm(across) > np.cos(np.radians(1.0))
+    assert (tmp_path / "s0.png").read_bytes()[:4] == b"\x89PNG"
+    x, y, _ = scans[0].translation
+    azimuth = np.degrees(np.arctan2(*scans[0].rotation[:2, 0])) % 360.0
+    start = tmp_path / "start.csv"
+    how += ["--ladders", folder / "ladders.csv", "--start", start]
+    start.write_text(f"file,x,y,within,azimuth\ns0.xyz,{x + 1.0:.1f},{y - 1.0:.1f},3.0,{azimuth:.0f}\n")
+    (scan,) = json.loads(command("register", NAME, folder / "s0.xyz", *how, "--json").stdout)["scans"]
+    assert scan["state"] == "determined"
+    assert np.linalg.norm(np.array(scan["translation"]) - scans[0].translation) < 0.03
+    start.write_text(f"file,x,y,within,azimuth\ns0.xyz,{x + 1.0:.1f},{y - 1.0:.1f},3.0,{azimuth - 180.0:.0f}\n")
+    (scan,) = json.loads(command("register", NAME, folder / "s0.xyz", *how, "--json", code=1).stdout)["scans"]
+    assert scan["state"] == "undetermined"
+
+
 def test_soundings_in_the_tunnels_system_need_no_pose(
     canal: tuple[Path, list[Sonar]], conn: psycopg.Connection, tmp_path: Path
 ) -> None:
