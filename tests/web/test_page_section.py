@@ -16,7 +16,7 @@ def test_section_names_its_lines_and_downloads_as_a_drawing(page: Page) -> None:
     panel = tab(page, "Section")
     panel.get_by_label("Chainage").fill("12+350")
     panel.get_by_role("button", name="Show").click()
-    expect(panel.get_by_role("img", name=re.compile("Section at"))).to_be_visible()
+    expect(panel.get_by_role("img", name=re.compile(r"Section at 12\+350"))).to_be_visible()
     key = panel.locator(".key li")
     expect(key.filter(has_text="design (lining: round)")).to_have_count(1)
     expect(key.filter(has_text="gauge (example, track single)")).to_have_count(1)
