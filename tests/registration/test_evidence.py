@@ -1,4 +1,4 @@
-"""What walls, water and features of the plan say about a pose; canal drawn here: x along, y across, water at zero."""
+"""Evidence for a pose from walls, water and features of the plan. The canal is drawn here: x along, y across, water at z 0."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def test_an_upright_surface_in_open_water_is_evidence_against_a_pose() -> None:
     assert np.nanmean(wrong.ratio[3000:]) < 0.1
     assert margin(points, right, wrong) > 1.5
     unknown = explained(points, ~upright, pose_at(6.0), walls, ())
-    assert np.isnan(unknown.ratio[3000:]).all()  # a bed, of which the laser shows nothing
+    assert np.isnan(unknown.ratio[3000:]).all()  # as points of the bed, which the laser does not show
 
 
 def patches(place: Float, normal: Float) -> Patches:

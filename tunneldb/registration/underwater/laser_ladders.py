@@ -46,7 +46,7 @@ OUTLIER_SIGMA = 5.0  # standard deviations from which a point does not belong to
 
 @dataclass(frozen=True)
 class Links:
-    """How points are linked to clusters, and when a cluster's rungs are those of a ladder.
+    """Limits for linking points to clusters, and for accepting the rungs of a cluster.
 
     Attributes
     ----------

@@ -233,11 +233,10 @@ def _fit_to_plan(scan: PreparedScan, patches: Patches, pose: Pose, walls: Walls,
     """Fit a candidate from the plan, first without ladders, then with those that it sees."""
     pose = _fit(Scan(patches, scan.smooth, scan.columns, scan.level, pose, {}), walls, found, FIRST_REACHES)
     seen = _seen(scan, pose, found)
-    if seen.missed and not seen.ladders:
-        seen = _seen(scan, _slid_to_ladder(scan, pose, found), found)
-    if not seen.ladders:
-        return _seen(scan, pose, found)
-    with_ladders = scan_of(scan.thin, patches, scan.smooth, scan.columns, scan.level, seen.pose, seen.ladders, found)
+    slid = _seen(scan, _slid_to_ladder(scan, pose, found), found) if seen.missed and not seen.ladders else seen
+    if not slid.ladders:
+        return seen
+    with_ladders = scan_of(scan.thin, patches, scan.smooth, scan.columns, scan.level, slid.pose, slid.ladders, found)
     return _seen(scan, _fit(with_ladders, walls, found, FIRST_REACHES[-3:]), found)
 
 
