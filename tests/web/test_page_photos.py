@@ -106,6 +106,16 @@ def test_a_photo_is_not_saved_until_the_server_has_it(shown: Page, database: psy
     forgive(page, "ERR_INTERNET_DISCONNECTED")
 
 
+def test_a_failed_read_does_not_hide_what_became_of_a_record(ines_context: BrowserContext, database: psycopg.Connection) -> None:
+    """The inspected share cannot be read: that stands in its own place."""
+    ines_context.route("**/summary", lambda route: route.abort())
+    with opened(ines_context, SHOWN) as page:
+        expect(page.locator("#limits")).to_contain_text("Inspected share: not known. The server cannot be reached.")
+        expect(page.locator("#state")).to_be_empty()
+        forgive(page, "ERR_FAILED")
+    ines_context.unroute("**/summary")
+
+
 def test_what_is_no_photo_is_said_in_one_line(shown: Page, database: psycopg.Connection) -> None:
     page = shown
     page_file: FilePayload = {"name": "evil.jpg", "mimeType": "image/jpeg", "buffer": b"<script>alert(1)</script>"}

@@ -123,7 +123,8 @@ def _signed_in(desk: Desk, session: Session, response: Response) -> Response:
 
 
 def _form(request: Request, error: str, status: int = 200) -> Response:
-    token = secrets.token_urlsafe(24)
+    # A second form of the same browser leaves the first one valid.
+    token = request.cookies.get(FORM_COOKIE) or secrets.token_urlsafe(24)
     response = TEMPLATES.TemplateResponse(request, "login.html", {"csrf": token, "error": error}, status_code=status)
     response.set_cookie(
         FORM_COOKIE, token, httponly=True, samesite="strict", secure=request.app.state.desk.secure, path="/login"

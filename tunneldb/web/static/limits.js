@@ -3,10 +3,10 @@
 import { el } from './dom.js';
 import { percent } from './format.js';
 
-/** Show the limits of a survey in one line; its remarks unfold. Without a summary they are not known yet. */
-export function showLimits(root, summary) {
+/** Show the limits of a survey in one line; its remarks unfold. Without a summary they are not known yet, or an error says why. */
+export function showLimits(root, summary, error = '') {
   const remarks = summary?.remarks ?? [];
-  const text = el('p', {}, el('strong', { text: inspected(summary) }), summary?.statement ? ` ${summary.statement}` : null);
+  const text = el('p', {}, el('strong', { text: error ? `Inspected share: not known. ${error}` : inspected(summary) }), summary?.statement ? ` ${summary.statement}` : null);
   const more = remarks.length ? el('details', { class: 'fold remarks' }, el('summary', { text: `${remarks.length} ${remarks.length === 1 ? 'remark' : 'remarks'}` }), list(remarks)) : null;
   const key = el('span', { class: 'hatch-key' }, el('i', {}), 'not inspected or not known');
   root.replaceChildren(text, ...(more ? [more] : []), key);

@@ -290,7 +290,7 @@ async function readSummary(survey) {
     showLimits(node('limits'), summary);
     if (panel.tab === 'notes') showTab('notes');
   } catch (error) {
-    say(`Inspected share: ${error.message}`, true);
+    if (survey === app.survey && !app.summary) showLimits(node('limits'), null, error.message);
   }
 }
 
@@ -301,7 +301,7 @@ async function readRibbon(survey) {
     ribbon.show(data, survey);
     lining.setRibbon(data);
   } catch (error) {
-    say(`Overview: ${error.message}`, true);
+    if (!error.away) say(`Overview: ${error.message}`, true);
   }
 }
 
