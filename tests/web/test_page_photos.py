@@ -106,7 +106,9 @@ def test_a_photo_is_not_saved_until_the_server_has_it(shown: Page, database: psy
     forgive(page, "ERR_INTERNET_DISCONNECTED")
 
 
-def test_a_failed_read_does_not_hide_what_became_of_a_record(ines_context: BrowserContext, database: psycopg.Connection) -> None:
+def test_a_failed_read_does_not_hide_what_became_of_a_record(
+    ines_context: BrowserContext, database: psycopg.Connection
+) -> None:
     """The inspected share cannot be read: that stands in its own place."""
     ines_context.route("**/summary", lambda route: route.abort())
     with opened(ines_context, SHOWN) as page:
