@@ -37,14 +37,14 @@ SCENERY = ("--lining", "segments", "--soot", "2", "--paint", "4", "--patches", "
 COUNT = """
 import contextlib, importlib, json, pkgutil
 import tunneldb
-from numba.core.dispatcher import Dispatcher
+from tunneldb.compiled import Loop
 
 loops = {}
 for module in pkgutil.walk_packages(tunneldb.__path__, "tunneldb.", onerror=lambda name: None):
     with contextlib.suppress(ImportError):
         for value in vars(importlib.import_module(module.name)).values():
-            if isinstance(value, Dispatcher) and value.py_func.__module__.startswith("tunneldb."):
-                loops[value.py_func.__module__, value.py_func.__qualname__] = bool(value.targetoptions.get("parallel"))
+            if isinstance(value, Loop) and value.py_func.__module__.startswith("tunneldb."):
+                loops[value.py_func.__module__, value.py_func.__qualname__] = bool(value.options.get("parallel"))
 print(json.dumps({"functions": len(loops), "parallel": sum(loops.values())}))
 """
 

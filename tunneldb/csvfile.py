@@ -19,10 +19,7 @@ import numpy as np
 from tunneldb.arrays import Float, Int64
 from tunneldb.csvsheet import Sheet, opened
 from tunneldb.errors import InputError
-from tunneldb.numerals import parse_number
-
-MAX_MEASUREMENT = 1e12
-"""Greatest measured value that is accepted; seconds since 1970 and coordinates are smaller."""
+from tunneldb.numerals import MAX_MEASUREMENT, parse_number
 
 NO_NUMBER = re.compile(r"[+-]?(?:nan(?:\(\w*\))?|1\.#(?:[QS]NAN|IND)0*|null|none|n/?a)", re.IGNORECASE)
 """Texts that programs write for a missing number, also those of C on Windows."""

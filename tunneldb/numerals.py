@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+MAX_MEASUREMENT = 1e12
+"""Greatest measured value that is accepted; seconds since 1970 and coordinates are smaller."""
+
 
 def parse_number(text: str) -> float:
     """Return the number of a text, also ``inf`` and ``nan``.

@@ -61,6 +61,26 @@ def test_help_imports_no_verb() -> None:
     assert output.endswith("[]\n")
 
 
+@pytest.mark.parametrize(
+    "words",
+    ["survey list", "tunnel list", "status", "leaks {}", "findings {}", "sections {}", "rating {}", "elements list demo",
+     "actions list demo", "alarms demo", "profile list demo", "spots {}", "prune"],
+)  # fmt: skip
+def test_a_list_imports_no_library_that_computes(words: str, example: str) -> None:
+    """Each would cost 0.1 to 0.5 s of a command that takes 0.5 s."""
+    program = (
+        "import sys, tunneldb.cli.main as m\n"
+        "try: m.main(sys.argv[1:])\n"
+        "except SystemExit: pass\n"
+        "print([name for name in ('numba', 'scipy.ndimage', 'scipy.spatial', 'pyproj', 'pyogrio', 'laspy', 'xlsxwriter')"
+        " if name in sys.modules])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program, *words.format(example).split()], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.endswith("[]\n"), done
+
+
 def test_where_nothing_compiled_can_be_kept_one_line_says_what_to_do(tmp_path: Path) -> None:
     """As for a user without a home whose tunneldb root has installed: Numba finds no folder that it may write to."""
     nowhere = dict.fromkeys(["HOME", "XDG_CACHE_HOME"], "/proc/no") | {"NUMBA_CACHE_LOCATOR_CLASSES": "UserWideCacheLocator"}

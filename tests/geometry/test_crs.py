@@ -9,7 +9,8 @@ import pytest
 from pyproj import CRS
 
 from tunneldb.arrays import Float
-from tunneldb.geometry.crs import LOCAL, fits_srid, mirroring_axes, outside_area
+from tunneldb.geometry.crs import fits_srid, mirroring_axes, outside_area
+from tunneldb.geometry.local import LOCAL
 
 PLACES = [  # published coordinates of places, m
     (3794, 462000.0, 101000.0, True),  # Ljubljana

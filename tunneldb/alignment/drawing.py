@@ -14,7 +14,8 @@ from tunneldb.arrays import Bool, Float
 from tunneldb.counted import counted
 from tunneldb.errors import InputError
 from tunneldb.files import gdal_fault, vector_source
-from tunneldb.geometry.crs import LOCAL, describe_crs, describe_srid, fits_srid, is_local, srid_name
+from tunneldb.geometry.crs import describe_crs, describe_srid, fits_srid, is_local, srid_name
+from tunneldb.geometry.local import LOCAL
 
 MAX_COORDINATE = 1e9
 """Greatest coordinate of a line, m; greater ones are damage."""

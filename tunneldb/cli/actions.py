@@ -232,7 +232,7 @@ def import_(settings: Settings, tunnel: str, file: Path) -> None:
     written, nothing is read, and the line is reported.
     """
     from tunneldb.pipeline.action_file import read_actions
-    from tunneldb.store.catalog import get_tunnel
+    from tunneldb.store.tunnel import get_tunnel
 
     require_ending(file, "a list of actions", (".xlsx", ".csv"))
     with connect(settings.dsn) as conn:
@@ -262,8 +262,8 @@ def _read(
     moment: dt.datetime | None = None,
 ) -> list[dict[str, Any]]:
     from tunneldb.store.actions import list_actions, outdated_comparisons
-    from tunneldb.store.catalog import get_tunnel
     from tunneldb.store.survey import get_survey
+    from tunneldb.store.tunnel import get_tunnel
 
     with connect_as_of(settings.dsn, survey or "", moment) as conn:
         tunnel_id = get_tunnel(conn, tunnel)

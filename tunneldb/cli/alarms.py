@@ -114,9 +114,9 @@ def add(
     in the unit of the quantity: 1 % of ovality is 0.01, 10 mm of convergence are 0.01.
     """
     from tunneldb.store.alarm import AlarmLimit, save_limit
-    from tunneldb.store.catalog import get_tunnel
     from tunneldb.store.design import get_design_tunnel
     from tunneldb.store.survey import get_survey
+    from tunneldb.store.tunnel import get_tunnel
 
     if alarm < warning:
         raise UserError(f"--alarm {alarm:g} is below --warning {warning:g}: an alarm is at least a warning")
@@ -152,7 +152,7 @@ def add(
 def list_(settings: Settings, tunnel: str) -> None:
     """List the limits of TUNNEL."""
     from tunneldb.store.alarm import list_limits
-    from tunneldb.store.catalog import get_tunnel
+    from tunneldb.store.tunnel import get_tunnel
 
     with connect(settings.dsn) as conn:
         rows = list_limits(conn, get_tunnel(conn, tunnel))
@@ -177,7 +177,7 @@ def list_(settings: Settings, tunnel: str) -> None:
 def remove(settings: Settings, tunnel: str, name: str) -> None:
     """Remove the limit NAME of TUNNEL."""
     from tunneldb.store.alarm import remove_limit
-    from tunneldb.store.catalog import get_tunnel
+    from tunneldb.store.tunnel import get_tunnel
 
     with connect(settings.dsn) as conn:
         remove_limit(conn, get_tunnel(conn, tunnel), tunnel, name)
@@ -198,7 +198,7 @@ def check(ctx: click.Context, tunnel: str, output: Path | None) -> None:
     The table has what is not below the warning: alarms first, and consecutive unknown places as one row.
     """
     from tunneldb.store.alarm import load_alarms
-    from tunneldb.store.catalog import get_tunnel
+    from tunneldb.store.tunnel import get_tunnel
 
     settings: Settings = ctx.obj
     require_ending(output, "the list of alarms", (".csv",))

@@ -9,7 +9,7 @@ from rich.console import Console
 
 from tunneldb.cli.output import add_to_json, notify, printable
 from tunneldb.counted import counted
-from tunneldb.geometry.crs import LOCAL
+from tunneldb.geometry.local import LOCAL
 from tunneldb.store.coverage import Coverage
 from tunneldb.store.remarks import Remark
 from tunneldb.store.survey import Survey

@@ -52,10 +52,10 @@ def add(
     up-chainage). Zones: crown 10 to 2 o'clock, right 2 to 5, invert 5 to 7, left 7 to 10.
     """
     from tunneldb.pipeline.rating_file import read_elements, stretches_of
-    from tunneldb.store.catalog import get_tunnel
     from tunneldb.store.design import get_design_tunnel
     from tunneldb.store.rating import joint_elements, ring_elements, save_elements, zoned
     from tunneldb.store.survey import get_survey
+    from tunneldb.store.tunnel import get_tunnel
 
     if sum(given is not None for given in (length, survey, joints, file)) != 1:
         raise UserError("give exactly one of --length M, --rings SURVEY, --joints SURVEY and --file FILE")
@@ -83,8 +83,8 @@ def add(
 @click.pass_obj
 def list_(settings: Settings, tunnel: str) -> None:
     """List the divisions of TUNNEL into elements."""
-    from tunneldb.store.catalog import get_tunnel
     from tunneldb.store.rating import list_elements
+    from tunneldb.store.tunnel import get_tunnel
 
     with connect(settings.dsn) as conn:
         rows = list_elements(conn, get_tunnel(conn, tunnel))
@@ -105,8 +105,8 @@ def list_(settings: Settings, tunnel: str) -> None:
 @click.pass_obj
 def remove(settings: Settings, tunnel: str, name: str) -> None:
     """Remove the division NAME of TUNNEL."""
-    from tunneldb.store.catalog import get_tunnel
     from tunneldb.store.rating import remove_elements
+    from tunneldb.store.tunnel import get_tunnel
 
     with connect(settings.dsn) as conn:
         remove_elements(conn, get_tunnel(conn, tunnel), tunnel, name)

@@ -27,7 +27,6 @@ from tunneldb.export.tables.leaks import clock_label
 from tunneldb.export.tables.workbooks import write_findings
 from tunneldb.files import replacing
 from tunneldb.finding_kind import DETECTED
-from tunneldb.pipeline.findings import import_findings
 from tunneldb.store.coverage import read_coverage
 from tunneldb.store.drawn_findings import undo_finding
 from tunneldb.store.dry_regions import read_dry_regions
@@ -297,6 +296,8 @@ def import_(
     chainage and arc, or 3D), by chainage_from, chainage_to, arc_from and arc_to, by chainage and arc, or by x, y and
     z; a chainage may be a station, as 12+345.678. Each wrong row is listed; then nothing is imported.
     """
+    from tunneldb.pipeline.findings import import_findings
+
     theirs, ours = _pairs(kinds, "--map"), _pairs(columns, "--column")
     with connect(settings.dsn) as conn:
         done = import_findings(conn, get_survey(conn, survey), file, theirs, ours, layer)

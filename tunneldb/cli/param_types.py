@@ -10,10 +10,9 @@ from typing import Any
 
 import click
 
-from tunneldb.csvfile import MAX_MEASUREMENT
 from tunneldb.errors import UserError
 from tunneldb.files import require_regular
-from tunneldb.numerals import is_plain
+from tunneldb.numerals import MAX_MEASUREMENT, is_plain
 
 SMALLEST = 1e-30
 """Numbers nearer to 0, which are not 0, cannot be meant; their squares are none in a database."""

@@ -53,8 +53,8 @@ def add(
     """
     from tunneldb.pipeline.profile_file import read_profile
     from tunneldb.shape.profile import Profile
-    from tunneldb.store.catalog import get_tunnel
     from tunneldb.store.design import get_design_tunnel, save_profile
+    from tunneldb.store.tunnel import get_tunnel
 
     if len(words) not in (2, 3):
         raise UserError("profile add takes TUNNEL, perhaps a NAME, and a FILE")
@@ -87,8 +87,8 @@ def add(
 def list_(settings: Settings, tunnel: str) -> None:
     """List the design profiles of TUNNEL and the transitions between them."""
     from tunneldb.shape.profile import stretches
-    from tunneldb.store.catalog import get_tunnel
     from tunneldb.store.design import load_profiles
+    from tunneldb.store.tunnel import get_tunnel
 
     rows = []
     with connect(settings.dsn) as conn:
@@ -119,8 +119,8 @@ def list_(settings: Settings, tunnel: str) -> None:
 @click.pass_obj
 def remove(settings: Settings, tunnel: str, name: str, layer: str) -> None:
     """Remove the design profile NAME of TUNNEL; deviations from it become stale."""
-    from tunneldb.store.catalog import get_tunnel
     from tunneldb.store.design import remove_profile
+    from tunneldb.store.tunnel import get_tunnel
 
     with connect(settings.dsn) as conn:
         remove_profile(conn, get_tunnel(conn, tunnel), tunnel, name, layer)

@@ -11,8 +11,8 @@ from typing import Any, Protocol, TypeVar
 import click
 import psycopg
 
-from tunneldb.csvfile import MAX_MEASUREMENT
 from tunneldb.errors import UserError
+from tunneldb.numerals import MAX_MEASUREMENT
 
 _METRES = re.compile(r"-?[0-9]+(\.[0-9]*)?")
 

@@ -35,7 +35,7 @@ class Srid(click.ParamType[int]):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
         """Return the number, LOCAL for ``local``."""
-        from tunneldb.geometry.crs import LOCAL
+        from tunneldb.geometry.local import LOCAL
 
         if value == "local":
             return LOCAL
@@ -151,7 +151,8 @@ def add(
     from tunneldb.pipeline.axis_search import complete, found_given
     from tunneldb.pointcloud.units import NOT_GIVEN, GivenUnits
     from tunneldb.store.alignment import read_equations, save_equations
-    from tunneldb.store.catalog import add_tunnel, get_tunnel, require_new_tunnel
+    from tunneldb.store.catalog import add_tunnel, require_new_tunnel
+    from tunneldb.store.tunnel import get_tunnel
 
     if (axis is None) != site:
         raise UserError("give a tunnel its --axis; or say --site, if it has none")
@@ -315,7 +316,7 @@ def stationing(settings: Settings, name: str, file: Path | None, show: bool, cle
     labels (12+345.678) in views, lists and pictures are stations.
     """
     from tunneldb.store.alignment import read_equations, save_equations
-    from tunneldb.store.catalog import get_tunnel
+    from tunneldb.store.tunnel import get_tunnel
 
     if [file is not None, show, clear].count(True) != 1:
         raise UserError("give either a FILE, or --show, or --clear")
@@ -333,7 +334,7 @@ def stationing(settings: Settings, name: str, file: Path | None, show: bool, cle
 @click.pass_obj
 def list_(settings: Settings) -> None:
     """List the tunnels."""
-    from tunneldb.geometry.crs import LOCAL
+    from tunneldb.geometry.local import LOCAL
 
     with connect(settings.dsn) as connection:
         rows = list_tunnels(connection)

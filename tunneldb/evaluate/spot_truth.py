@@ -16,7 +16,8 @@ from tunneldb.arrays import Bool
 from tunneldb.errors import InputError
 from tunneldb.evaluate.truth import read_polygons
 from tunneldb.files import MAX_JSON_MEGABYTES, require_at_most
-from tunneldb.geometry.crs import LOCAL, srid_name
+from tunneldb.geometry.crs import srid_name
+from tunneldb.geometry.local import LOCAL
 from tunneldb.store.survey import Survey
 
 MIN_POINTS, MAX_INCIDENCE = 100, 75.0

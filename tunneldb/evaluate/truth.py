@@ -20,7 +20,7 @@ from shapely.geometry import MultiPolygon, Polygon
 
 from tunneldb.errors import InputError
 from tunneldb.files import MAX_JSON_MEGABYTES, gdal_fault, require_at_most, vector_source
-from tunneldb.geometry.crs import LOCAL
+from tunneldb.geometry.local import LOCAL
 from tunneldb.store.survey import Survey
 
 

@@ -12,15 +12,11 @@ from pyproj.exceptions import CRSError, ProjError
 
 from tunneldb.arrays import Float
 from tunneldb.geometry.crs_equality import epsg_code, horizontal, same_horizontally, vertical
+from tunneldb.geometry.local import LOCAL, LOCAL_NAME
 from tunneldb.geometry.units import METRES, unit_name, unit_option
 
 if TYPE_CHECKING:
     from pyproj._crs import Axis
-
-LOCAL = 0
-"""SRID of a tunnel in local coordinates, metres without a place on Earth; PostGIS's number for no reference system."""
-
-LOCAL_NAME = "local coordinates"
 
 MARGIN = 0.5
 """Greatest distance beyond the bounds of a system's area of use, degrees: surveys may cross the border of a zone or a

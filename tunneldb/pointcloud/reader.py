@@ -10,7 +10,6 @@ import numpy as np
 
 from tunneldb.errors import InputError
 from tunneldb.geometry.crs import (
-    LOCAL,
     describe_crs,
     describe_srid,
     fits_srid,
@@ -20,6 +19,7 @@ from tunneldb.geometry.crs import (
     srid_name,
 )
 from tunneldb.geometry.crs_equality import horizontal, lacks_datum
+from tunneldb.geometry.local import LOCAL
 from tunneldb.geometry.units import IN_METRES, Units
 from tunneldb.pointcloud.file_sample import read_runs
 from tunneldb.pointcloud.formats.faults import require_dimension

@@ -17,7 +17,8 @@ import shapely
 from tunneldb.alignment.given import GivenAxis
 from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
-from tunneldb.geometry.crs import LOCAL, LOCAL_NAME, mirroring_axes
+from tunneldb.geometry.crs import mirroring_axes
+from tunneldb.geometry.local import LOCAL, LOCAL_NAME
 from tunneldb.geometry.units import IN_METRES, Units
 from tunneldb.store.alignment import save_design
 from tunneldb.store.scanner import (
@@ -351,20 +352,6 @@ def _alignment(connection: psycopg.Connection[Any], tunnel: str) -> tuple[int, i
         return key, srid, None
     xyz = shapely.get_coordinates(shapely.from_wkb(wkb), include_z=True)
     return key, srid, Alignment.from_polyline(xyz, start, spacing)
-
-
-def get_tunnel(connection: psycopg.Connection[Any], name: str) -> int:
-    """Return the key of the tunnel of that name.
-
-    Raises
-    ------
-    UserError
-        If there is none; with the existing ones.
-    """
-    row = connection.execute("SELECT id FROM tunnel.tunnel WHERE name = %s", [name]).fetchone()
-    if row is None:
-        raise unknown_tunnel(connection, name)
-    return int(row[0])
 
 
 def remove_survey(connection: psycopg.Connection[Any], name: str) -> None:

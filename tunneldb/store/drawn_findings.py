@@ -5,16 +5,18 @@ from __future__ import annotations
 import datetime as dt
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import psycopg
 import shapely
 from shapely.geometry import Polygon
 
-from tunneldb.anomalies.measure import Measurement
 from tunneldb.errors import UserError
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.store.survey import Survey
+
+if TYPE_CHECKING:
+    from tunneldb.anomalies.measure import Measurement
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from psycopg import sql
 
 from tunneldb.export.tables.geopackage import UNDEFINED_CARTESIAN
 from tunneldb.export.tables.workbook import Column, Sheet, write_workbook
-from tunneldb.geometry.crs import LOCAL
+from tunneldb.geometry.local import LOCAL
 from tunneldb.measures.change.tables import COLUMNS, Row
 from tunneldb.store.catalog import crs_text
 from tunneldb.store.survey import Survey

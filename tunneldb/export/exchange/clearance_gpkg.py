@@ -12,7 +12,7 @@ import pyogrio.raw
 from psycopg import sql
 
 from tunneldb.export.tables.geopackage import UNDEFINED_CARTESIAN
-from tunneldb.geometry.crs import LOCAL
+from tunneldb.geometry.local import LOCAL
 from tunneldb.store.catalog import crs_text
 from tunneldb.store.survey import Survey
 

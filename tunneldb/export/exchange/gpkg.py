@@ -22,7 +22,7 @@ from tunneldb.export.qgis.layer import LAYERS, SPACE, VectorLayer, only
 from tunneldb.export.qgis.styles import STYLE_NAME, style_text
 from tunneldb.export.tables.geopackage import UNDEFINED_CARTESIAN, write_remarks
 from tunneldb.finding_kind import DRY
-from tunneldb.geometry.crs import LOCAL
+from tunneldb.geometry.local import LOCAL
 from tunneldb.geometry.surface import Surface
 from tunneldb.store.alignment import labels
 from tunneldb.store.catalog import crs_text

@@ -13,7 +13,7 @@ import shapely
 from psycopg import sql
 
 from tunneldb.export.tables.geopackage import UNDEFINED_CARTESIAN
-from tunneldb.geometry.crs import LOCAL
+from tunneldb.geometry.local import LOCAL
 from tunneldb.measures.rings.tables import CIRCLE_COLUMNS, Row
 from tunneldb.store.catalog import crs_text
 from tunneldb.store.survey import Survey

@@ -19,7 +19,7 @@ from tunneldb.arrays import Float, Single
 from tunneldb.export.images.cog import Extent, write_cog
 from tunneldb.files import replacing
 from tunneldb.geometry.alignment import Alignment
-from tunneldb.geometry.crs import LOCAL_NAME
+from tunneldb.geometry.local import LOCAL_NAME
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.store.catalog import crs_text
 from tunneldb.store.sonar import BedCells, load_bed, load_sonar_points

@@ -26,7 +26,7 @@ from tunneldb.export.pointcloud.survey import (
 from tunneldb.export.pointcloud.vpc import Cloud, listed_clouds, write_vpc
 from tunneldb.files import replacing
 from tunneldb.geometry.alignment import Alignment
-from tunneldb.geometry.crs import LOCAL
+from tunneldb.geometry.local import LOCAL
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pointcloud.formats.copc import FORMATS, writing_copc
 from tunneldb.pointcloud.formats.las_header import Head

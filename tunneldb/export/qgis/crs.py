@@ -9,7 +9,7 @@ import pyproj
 from pyproj.exceptions import CRSError
 
 from tunneldb.errors import UserError
-from tunneldb.geometry.crs import LOCAL
+from tunneldb.geometry.local import LOCAL
 
 
 def crs_element(conn: psycopg.Connection, srid: int) -> ET.Element:

@@ -14,7 +14,7 @@ from tunneldb.csvfile import write_csv
 from tunneldb.export.tables.cell import DECIMALS, plain
 from tunneldb.export.tables.geopackage import write_gaps, write_layer, write_remarks
 from tunneldb.export.tables.notes import note_rows
-from tunneldb.geometry.crs import LOCAL
+from tunneldb.geometry.local import LOCAL
 from tunneldb.store.coverage import Coverage
 from tunneldb.store.findings import Finding, Geometry
 from tunneldb.store.remarks import Remark

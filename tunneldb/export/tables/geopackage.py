@@ -10,12 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyogrio.raw
 import shapely
 from shapely.geometry.base import BaseGeometry
 
 from tunneldb.export.tables.cell import plain
-from tunneldb.geometry.crs import LOCAL
+from tunneldb.geometry.local import LOCAL
 from tunneldb.store.coverage import Coverage, CoverageGap
 from tunneldb.store.remarks import Remark
 
@@ -50,6 +49,8 @@ def write_layer(
     description : str
         Description of the layer.
     """
+    import pyogrio.raw
+
     columns, masks = [], []
     for column, held in values.items():
         kind = _TYPE.get(column, object)
@@ -126,6 +127,8 @@ def write_remarks(path: Path, remarks: Sequence[Remark], **options: str) -> None
 
 
 def _write_table(path: Path, name: str, columns: dict[str, tuple[Any, list[Any]]], description: str, **options: str) -> None:
+    import pyogrio.raw
+
     data = [np.array(values, dtype=kind) for kind, values in columns.values()]
     pyogrio.raw.write(
         str(path), None, data, np.array(list(columns)), geometry_type=None, driver="GPKG", layer=name, DESCRIPTION=description,

@@ -8,14 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyogrio.raw
 import shapely
 from shapely.geometry import mapping
 
 from tunneldb.csvfile import write_csv
 from tunneldb.export.tables.cell import DECIMALS, plain
 from tunneldb.export.tables.geopackage import UNDEFINED_CARTESIAN
-from tunneldb.geometry.crs import LOCAL
+from tunneldb.geometry.local import LOCAL
 from tunneldb.store.spots import COLUMNS, Geometry, SpotList
 
 
@@ -54,6 +53,8 @@ def as_geojson(spots: SpotList, geometry: Geometry, srid: int) -> str:
 
 def write_gpkg(path: Path, spots: SpotList, geometry: Geometry, srid: int) -> None:
     """Write spots as a GeoPackage with one layer, whose description says for what they can't be vouched."""
+    import pyogrio.raw
+
     data = [_column(spots, name) for name in COLUMNS]
     said = f"{spots.statement}. {spots.total}" if spots.statement else spots.total
     bare = geometry == "face" or srid == LOCAL

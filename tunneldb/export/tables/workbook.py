@@ -9,14 +9,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from pathlib import Path
-from typing import Any
-
-import xlsxwriter
-from xlsxwriter.format import Format
-from xlsxwriter.worksheet import Worksheet
+from typing import TYPE_CHECKING, Any
 
 from tunneldb import __version__
 from tunneldb.errors import UserError
+
+if TYPE_CHECKING:
+    from xlsxwriter.format import Format
+    from xlsxwriter.worksheet import Worksheet
 
 MAX_ROWS = 1_048_576
 """Maximum number of rows of a sheet, by ECMA-376."""
@@ -52,6 +52,8 @@ def write_workbook(path: Path, sheets: Sequence[Sheet], title: str) -> None:
     UserError
         If a sheet has more rows than Excel knows.
     """
+    import xlsxwriter
+
     for sheet in sheets:
         if len(sheet.rows) >= MAX_ROWS:
             raise UserError(
