@@ -62,6 +62,9 @@ BEGIN
         END LOOP;
         EXECUTE format('INSERT INTO tunnel.%I SELECT %s, p.km, p.chainage, p.gps_time, p.geom, p.segment, p.scan_id, p.file_id,'
             'p.intensity, p.classification, p.class FROM first_point p', 'point_s' || survey, survey);
+        FOR km IN 0 .. {kilometres} - 1 LOOP
+            EXECUTE format('ANALYZE tunnel.%I (survey_id, km, chainage, segment)', tunnel_internal.partition_name(survey, km));
+        END LOOP;
     END LOOP;
 END
 $$

@@ -1,5 +1,5 @@
--- Disk space of surveys. Reads the catalogue, its statistics and file sizes only: a survey of thousands of kilometres has as
--- many partitions.
+-- Disk space of surveys. Reads the catalogue, its statistics and file sizes only; of partitions of points, of which there may be
+-- thousands, the catalogue alone: to ask for the size of their files takes six times as long.
 
 -- Kind of data in each table. A table that is not listed is a result.
 CREATE OR REPLACE FUNCTION tunnel_internal.table_kind(name text) RETURNS text
@@ -23,22 +23,38 @@ CREATE OR REPLACE FUNCTION tunnel_internal.survey_sizes()
 RETURNS TABLE (survey_id integer, kind text, rows bigint, bytes bigint, estimated boolean)
 LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 100 SET search_path = pg_catalog, pg_temp SET jit = off
 AS $$
-    WITH relation AS MATERIALIZED (
-        SELECT c.oid, c.relname::text AS name, c.reltuples, pg_total_relation_size(c.oid) AS bytes, pg_relation_size(c.oid) AS heap,
-               substring(c.relname FROM '^(?:point|fragment|image)_s([0-9]+)(?:_|$)')::integer AS survey_id
+    WITH named AS MATERIALIZED (  -- point_s12_km3, image_s12 and the like by their survey; text functions, for there are many
+        SELECT c.oid, c.relname::text AS name, c.reltuples, c.relpages,
+               CASE WHEN c.relname LIKE ANY ('{point\\_s%,fragment\\_s%,image\\_s%}')
+                    THEN split_part(split_part(c.relname, '_s', 2), '_', 1) END AS survey
           FROM pg_class c
          WHERE c.relnamespace = 'tunnel'::regnamespace AND c.relkind = 'r'
+    ), index AS (
+        SELECT i.indrelid, sum(x.relpages) AS pages
+          FROM pg_index i
+          JOIN pg_class x ON x.oid = i.indexrelid
+         GROUP BY i.indrelid
+    ), relation AS MATERIALIZED (  -- partitions of points are written once and analysed: the catalogue knows their pages
+        SELECT n.oid, n.name, n.reltuples,
+               CASE WHEN translate(n.survey, '0123456789', '') = '' AND n.survey <> '' THEN n.survey::integer END AS survey_id,
+               CASE WHEN k.known THEN (n.relpages + coalesce(i.pages, 0)) * current_setting('block_size')::integer
+                    ELSE pg_total_relation_size(n.oid) END AS bytes,
+               CASE WHEN k.known THEN n.relpages ELSE pg_relation_size(n.oid) END AS heap
+          FROM named n
+         CROSS JOIN LATERAL (SELECT n.name LIKE 'point\_s%' AND n.relpages > 0 AND n.reltuples >= 0) k (known)
+          LEFT JOIN index i ON i.indrelid = n.oid
     ), own AS (
-        SELECT r.survey_id, tunnel_internal.table_kind(r.name) AS kind,
+        SELECT r.survey_id, tunnel_internal.table_kind(min(r.name)) AS kind,
                sum(CASE WHEN r.heap = 0 THEN 0 WHEN r.reltuples >= 0 THEN r.reltuples END)
                    + CASE WHEN bool_or(r.heap > 0 AND r.reltuples < 0) THEN NULL ELSE 0 END AS rows,
-               sum(r.bytes) AS bytes, false AS shared
+               sum(r.bytes) AS bytes
           FROM relation r
          WHERE r.survey_id IS NOT NULL
-         GROUP BY 1, 2
+         GROUP BY r.survey_id, r.name LIKE 'image%'
     ), keyed AS MATERIALIZED (  -- tables in common, and the one that has the survey's key: itself, or the one that it belongs to
-        SELECT DISTINCT ON (r.oid) r.oid, r.name, r.reltuples, r.bytes, r.heap, coalesce(a.attrelid, p.attrelid) AS key_table,
-               coalesce(a.attname, p.attname)::text AS key_column
+        SELECT DISTINCT ON (r.oid) r.oid, tunnel_internal.table_kind(r.name) AS kind, coalesce(a.attrelid, p.attrelid) AS key_table,
+               r.heap > 0 AND r.reltuples < 0 AS unknown, CASE WHEN r.heap = 0 THEN 0 ELSE r.reltuples END AS rows,
+               CASE WHEN r.heap = 0 THEN 0 ELSE r.bytes END AS bytes
           FROM relation r
           LEFT JOIN pg_attribute a ON a.attrelid = r.oid AND NOT a.attisdropped
                AND a.attname = CASE r.name WHEN 'survey' THEN 'id' ELSE 'survey_id' END
@@ -46,34 +62,42 @@ AS $$
           LEFT JOIN pg_attribute p ON p.attrelid = f.confrelid AND p.attname = 'survey_id' AND NOT p.attisdropped
          WHERE r.survey_id IS NULL AND coalesce(a.attrelid, p.attrelid) IS NOT NULL
          ORDER BY r.oid, f.conname
-    ), common AS (
-        SELECT s.schemaname, s.tablename, v.survey_id, v.share
-          FROM pg_stats s
+    ), common AS MATERIALIZED (
+        SELECT t.oid AS key_table, v.survey_id, v.share
+          FROM pg_class t
+          JOIN pg_stats s ON s.tablename = t.relname
          CROSS JOIN LATERAL unnest(s.most_common_vals::text::integer[], s.most_common_freqs) AS v (survey_id, share)
-         WHERE s.schemaname = 'tunnel' AND s.attname = 'survey_id' AND NOT s.inherited
-    ), share AS MATERIALIZED (
-        SELECT k.oid, s.id AS survey_id,
-               coalesce(m.share, greatest(1 - coalesce(sum(m.share) OVER (PARTITION BY k.oid), 0), 0)
-                                 / count(*) FILTER (WHERE m.share IS NULL) OVER (PARTITION BY k.oid))::float8 AS share
+          JOIN tunnel.survey u ON u.id = v.survey_id
+         WHERE t.oid = ANY (ARRAY(SELECT k.key_table FROM keyed k)) AND s.schemaname = 'tunnel' AND s.attname = 'survey_id'
+               AND NOT s.inherited
+    ), rest AS (  -- the share of each survey that is not among the most common values
+        SELECT k.oid, greatest(1 - coalesce(c.share, 0), 0) / nullif((SELECT count(*) FROM tunnel.survey) - coalesce(c.surveys, 0), 0)
+                   AS share
           FROM keyed k
-          JOIN pg_class t ON t.oid = k.key_table
-         CROSS JOIN tunnel.survey s
-          LEFT JOIN common m ON m.tablename = t.relname AND m.survey_id = s.id
+          LEFT JOIN (SELECT c.key_table, sum(c.share)::float8 AS share, count(*) AS surveys FROM common c GROUP BY c.key_table) c
+               ON c.key_table = k.key_table
+    ), shared AS (  -- all surveys have the rest of each table, and those among the common values the difference
+        SELECT s.id AS survey_id, r.kind, r.rows, r.bytes
+          FROM tunnel.survey s
+         CROSS JOIN (SELECT k.kind, sum(k.rows * coalesce(e.share, 0)) AS rows, sum(k.bytes * coalesce(e.share, 0)) AS bytes
+                       FROM keyed k JOIN rest e ON e.oid = k.oid WHERE NOT k.unknown GROUP BY k.kind) r
+         UNION ALL
+        SELECT c.survey_id, k.kind, k.rows * (c.share - coalesce(e.share, 0)), k.bytes * (c.share - coalesce(e.share, 0))
+          FROM keyed k
+          JOIN rest e ON e.oid = k.oid
+          JOIN common c ON c.key_table = k.key_table
+         WHERE NOT k.unknown
     ), part AS (
-        SELECT h.survey_id, tunnel_internal.table_kind(k.name) AS kind, CASE WHEN k.heap = 0 THEN 0 ELSE k.reltuples * h.share END AS rows,
-               CASE WHEN k.heap = 0 THEN 0 ELSE k.bytes * h.share END AS bytes, true AS shared
-          FROM keyed k
-          JOIN share h ON h.oid = k.oid
-         WHERE k.heap = 0 OR k.reltuples >= 0
+        SELECT h.survey_id, h.kind, sum(h.rows) AS rows, round(sum(h.bytes)) AS bytes, round(sum(h.bytes)) > 0 AS shared
+          FROM shared h
+         GROUP BY h.survey_id, h.kind
          UNION ALL
-        SELECT NULL, tunnel_internal.table_kind(k.name), NULL, k.bytes, false
-          FROM keyed k
-         WHERE k.heap > 0 AND k.reltuples < 0
+        SELECT NULL, k.kind, NULL, k.bytes, false FROM keyed k WHERE k.unknown
          UNION ALL
-        SELECT o.survey_id, o.kind, o.rows, o.bytes, o.shared FROM own o
+        SELECT o.survey_id, o.kind, o.rows, o.bytes, false FROM own o
     )
     SELECT p.survey_id, p.kind, CASE WHEN bool_or(p.rows IS NULL) THEN NULL ELSE round(sum(p.rows))::bigint END,
-           round(sum(p.bytes))::bigint, bool_or(p.shared AND p.bytes > 0)
+           round(sum(p.bytes))::bigint, bool_or(p.shared)
       FROM part p
      GROUP BY p.survey_id, p.kind
 $$;
