@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import os
 import sys
+import threading
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
+from functools import cache
 
 _POOLS = ("NUMBA_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "RAYON_NUM_THREADS", "GDAL_NUM_THREADS")
 _chosen: list[int] = []
+_own = threading.local()
+"""Of each thread: `busy` is True if it works for `in_blocks`."""
 
 
 def use_threads(count: int) -> None:
@@ -50,10 +54,29 @@ def in_blocks(work: Callable[[int, int], object], count: int, size: int) -> None
     """
     starts = range(0, count, size)
     many = min(threads(), len(starts))
-    if many <= 1:
+
+    def block(begin: int) -> None:
+        _own.busy = True
+        work(begin, min(begin + size, count))
+
+    if many <= 1 or getattr(_own, "busy", False):  # a thread that waited for others of its pool might wait for ever
         for begin in starts:
             work(begin, min(begin + size, count))
         return
-    with ThreadPoolExecutor(many) as pool:
-        for _ in pool.map(lambda begin: work(begin, min(begin + size, count)), starts):
-            pass
+    blocks = [_pool(threads()).submit(block, begin) for begin in starts]
+    try:
+        for done in blocks:
+            done.result()
+    finally:  # after an error none writes on
+        for waiting in blocks:
+            waiting.cancel()
+        wait(blocks)
+
+
+@cache
+def _pool(many: int) -> ThreadPoolExecutor:
+    """Return the threads of this process, which are kept: starting them takes longer than a small block."""
+    return ThreadPoolExecutor(many, thread_name_prefix="blocks")
+
+
+os.register_at_fork(after_in_child=_pool.cache_clear)  # threads do not outlive a fork
