@@ -3,6 +3,7 @@
     python -m benchmarks.start                                # 30 m of tunnel: simulate, load, run
     python -m benchmarks.start --demo                         # all verbs of scripts/demo.sh, at its size
     python -m benchmarks.start --tunneldb other/bin/tunneldb  # another installation, for before and after
+    python -m benchmarks.start --lists                        # how long a list takes: leaks, findings, status
     python -m benchmarks.start --perf                         # also instructions, on a machine that is busy
 
 cold    into an empty folder for compiled code; the user's own is not touched
@@ -26,6 +27,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from benchmarks.common import COMMAND, print_table, progress, save
@@ -33,18 +35,29 @@ from benchmarks.common import COMMAND, print_table, progress, save
 SHORT = ("--length", "30", "--straight", "0", "--density", "400")
 SCENERY = ("--lining", "segments", "--soot", "2", "--paint", "4", "--patches", "4", "--joint-leaks", "2", "--drips")
 
+LISTS = {
+    "leaks": ["leaks", "warm-2024"],
+    "findings": ["findings", "warm-2024"],
+    "status": ["status"],
+    "survey list": ["survey", "list"],
+    "actions list": ["actions", "list", "warm"],
+    "elements list": ["elements", "list", "warm"],
+}
+REPEATS = 7
+
 # Runs in the installation that is measured.
 COUNT = """
 import contextlib, importlib, json, pkgutil
 import tunneldb
-from tunneldb.compiled import Loop
 
 loops = {}
 for module in pkgutil.walk_packages(tunneldb.__path__, "tunneldb.", onerror=lambda name: None):
     with contextlib.suppress(ImportError):
         for value in vars(importlib.import_module(module.name)).values():
-            if isinstance(value, Loop) and value.py_func.__module__.startswith("tunneldb."):
-                loops[value.py_func.__module__, value.py_func.__qualname__] = bool(value.options.get("parallel"))
+            function = getattr(value, "py_func", None)
+            if getattr(function, "__module__", "").startswith("tunneldb."):
+                options = getattr(value, "options", None) or value.targetoptions
+                loops[function.__module__, function.__qualname__] = bool(options.get("parallel"))
 print(json.dumps({"functions": len(loops), "parallel": sum(loops.values())}))
 """
 
@@ -129,6 +142,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--tunneldb", type=Path, metavar="PATH", help="the program to measure; default: the one at hand")
     parser.add_argument("--demo", action="store_true", help="all commands of the demo, at its size")
+    parser.add_argument("--lists", action="store_true", help="the commands that list what is there, and nothing else")
     parser.add_argument("--perf", action="store_true", help="also count instructions, by Linux's perf")
     arguments = parser.parse_args()
     command = [str(arguments.tunneldb.absolute())] if arguments.tunneldb else COMMAND
@@ -138,10 +152,27 @@ def main() -> None:
         loops = measured.loops()
         progress("init")
         measured.run("init")
+        if arguments.lists:
+            measure(measured, "warm", demo=False)
+            report_lists({verb: repeat(measured, words) for verb, words in LISTS.items()})
+            return
         passes = {name: measure(measured, name, arguments.demo) for name in ("cold", "warm")}
     figures: dict[str, Any] = {"demo": arguments.demo, "loops": loops, **passes, "load_average": os.getloadavg()[0]}
     report(figures)
     print(f"\n{save('start-demo' if arguments.demo else 'start', figures)}")
+
+
+def repeat(measured: Installation, words: Sequence[str]) -> tuple[float, float]:
+    """Return the medians of seconds of the processor and by the clock."""
+    runs = [measured.run(*words) for _ in range(REPEATS)]
+    return median(run["processor"] for run in runs), median(run["clock"] for run in runs)
+
+
+def report_lists(found: dict[str, tuple[float, float]]) -> None:
+    """Print and save what the lists took."""
+    rows = [(name, f"{processor:.2f}", f"{clock:.2f}") for name, (processor, clock) in found.items()]
+    print_table(f"Lists, medians of {REPEATS}", ("command", "processor, s", "clock, s"), rows)
+    print(f"\nload average {os.getloadavg()[0]:.1f}\n{save('start-lists', {'lists': found})}")
 
 
 def measure(measured: Installation, name: str, demo: bool) -> dict[str, dict[str, float]]:
