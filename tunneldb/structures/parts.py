@@ -10,6 +10,7 @@ straight, and rust is wider.
 from __future__ import annotations
 
 import numpy as np
+from scipy import ndimage
 
 from tunneldb.arrays import Bool, Float, Single
 from tunneldb.structures.cuts import edge_of, line_of
@@ -38,8 +39,8 @@ ANGLES = np.radians(np.arange(0.0, 180.0, 2.0))
 BAND = 8
 """Distance from the line within which contrast is compared, pixels."""
 
-HALF_WIDTH = 1.5
-"""Half of the maximum width of a seam, pixels: what is narrower than a pixel may be in two of them."""
+MAX_WIDTH = 2.0
+"""Maximum width of a seam, pixels: what is narrower than a pixel lies in one or two of them. A streak of rust is wider."""
 
 SEGMENT, MIN_SEGMENTS, MIN_PRESENT = 4, 7, 0.75
 """Length of the segments of a seam, pixels, minimum number of them, and minimum share that shows the seam."""
@@ -92,7 +93,7 @@ def is_seam(mask: Bool, drop: Single, judged: Bool) -> bool:
     """
     at = np.argwhere(judged)[:, ::-1] + 0.5
     value, inside = drop[judged].astype(np.float64), mask[judged]
-    if not inside.any():
+    if not inside.any() or ndimage.binary_erosion(mask, iterations=3).any():  # wider than windows make a line
         return False
     middle = at[inside].mean(axis=0)
     off = at - middle
@@ -100,20 +101,26 @@ def is_seam(mask: Bool, drop: Single, judged: Bool) -> bool:
     off, value, inside = off[near], value[near], inside[near]
     found = [(*_peak(off @ np.array([-np.sin(a), np.cos(a)]), value), a) for a in ANGLES]
     peak, place, angle = max(found)
-    across = np.abs(off @ np.array([-np.sin(angle), np.cos(angle)]) - place)
+    across = off @ np.array([-np.sin(angle), np.cos(angle)]) - place
     along = off @ np.array([np.cos(angle), np.sin(angle)])
-    line, beside = across <= HALF_WIDTH - 0.5, (across > HALF_WIDTH + 0.5) & (across <= BAND)
-    aside = inside & (across > HALF_WIDTH + 0.5)
-    if peak <= 0.0 or not beside.any() or (aside.any() and value[aside].mean() > 0.5 * peak):
+    beside = (np.abs(across) > 2.5) & (np.abs(across) <= BAND)
+    if peak <= 0.0 or not beside.any():
         return False
-    segment = np.floor((along + REACH) / SEGMENT).astype(np.int64)
-    count = np.bincount(segment[line], minlength=1)
-    shown = np.bincount(segment[line], value[line], minlength=1) / np.maximum(count, 1) - np.median(value[beside])
+    background = float(np.median(value[beside]))
+    lines = [value[np.abs(across - shift) <= 0.5] for shift in (-2.0, -1.0, 0.0, 1.0, 2.0)]
+    width = sum(float(line.mean()) - background for line in lines if len(line)) / peak
+    aside = inside & (np.abs(across) > 2.0)
+    if width > MAX_WIDTH or (aside.any() and value[aside].mean() > 0.5 * peak):
+        return False
+    line = np.abs(across) <= 1.0
+    segment = np.floor((along[line] + REACH) / SEGMENT).astype(np.int64)
+    count = np.bincount(segment, minlength=1)
     known = count >= SEGMENT // 2
-    typical = float(np.median(shown[known])) if known.any() else 0.0
-    wide = float(value[beside].mean() - np.median(value[beside]))
-    present = int(np.count_nonzero(shown[known] > 0.5 * max(typical, 0.5 * peak)))
-    return present >= MIN_SEGMENTS and present >= MIN_PRESENT * int(known.sum()) and wide < 0.25 * peak
+    shown = np.bincount(segment, value[line], minlength=1)[known] / count[known] - background
+    if len(shown) < MIN_SEGMENTS:
+        return False
+    present = int(np.count_nonzero(shown > 0.5 * max(float(np.median(shown)), 0.5 * peak)))
+    return present >= max(MIN_SEGMENTS, MIN_PRESENT * len(shown))
 
 
 def _peak(across: Float, value: Float) -> tuple[float, float]:
