@@ -2,7 +2,7 @@
 
 Their outline is a triangle or quadrilateral with straight edges, and they are as even as the surface. Rust and damp end on
 straight edges only where the face itself ends. So a drawn region lies within its face, or goes around a pipe, or is one of
-several of the same width and contrast.
+several of the same width and contrast. Parts flush with the face and seams are of the design, too; see `parts`.
 """
 
 from __future__ import annotations
@@ -88,6 +88,8 @@ class Patch:
         Loss of contrast beside its edge: the sum of both sides, in the contrast within it.
     cuts : int
         Number of straight lines that cut it off its face; see `cuts`.
+    pipe : bool
+        True on a pipe.
     attached, seam : bool
         True if it lies beyond the rim of its face, or is a part of a straight line; see `parts`.
     """
@@ -101,6 +103,7 @@ class Patch:
     sigma: float
     blur: float
     cuts: int
+    pipe: bool = False
     attached: bool = False
     seam: bool = False
 
@@ -142,8 +145,8 @@ def _alone(patch: Patch) -> tuple[bool, Design | None]:
     sharp = patch.blur <= (MAX_BLUR if patch.even else MAX_UNEVEN_BLUR)
     if clear and sharp and regular <= MAX_DEVIATION and patch.free >= MIN_FREE:
         return patch.even, "label"
-    free = patch.cuts == 2 or (patch.free >= MIN_FREE_OF_RING and patch.cuts == 1)
-    if patch.ring and free and patch.even and sharp:
+    around = patch.ring and patch.free >= MIN_FREE_OF_RING and patch.cuts == 1
+    if patch.even and sharp and (around or (patch.pipe and patch.cuts == 2)):
         return True, "band"
     return patch.even and straight <= MAX_DEVIATION, None
 
@@ -212,7 +215,7 @@ def patch_of(
     region, near, contrast = _around(mask, corner, judged, drop)
     seam = is_seam(region, contrast if level >= 0.0 else -contrast, near)
     return Patch(
-        mask, pixel, free, ring, level, scatter, sigma, blur, cuts_of(wide, within), is_attached(region, near), seam
+        mask, pixel, free, ring, level, scatter, sigma, blur, cuts_of(wide, within), pipe, is_attached(region, near), seam
     )  # fmt: skip
 
 
