@@ -58,7 +58,7 @@ def test_points_get_their_numbers_and_keep_the_rest(plant: Path, tmp_path: Path)
     code, told = _run(plant, "-o", str(tmp_path / "out.laz"))
     assert code == 0
     assert [spot["kind"] for spot in told["spots"]] == ["dark"]
-    assert told["left_out"] == {"labels": 1, "bands": 0, "stray": 0}
+    assert told["left_out"] == {"labels": 1, "bands": 0, "stray": 0, "parts": 0, "seams": 0}
     before, after = laspy.read(plant), laspy.read(tmp_path / "out.laz")
     for name in before.point_format.dimension_names:
         assert (before[name] == after[name]).all(), name

@@ -38,7 +38,7 @@ def cuts_of(mask: Bool, face: Bool) -> int:
     face : (rows, columns) bool array
         The judged part of the face there.
     """
-    points, piece = _edge(mask, face & ~mask)
+    points, piece = edge_of(mask, face & ~mask)
     centres = np.argwhere(mask)[:, ::-1] + 0.5
     off, count = np.full(len(points), np.inf), 0
     for _ in range(SIDES):
@@ -49,7 +49,7 @@ def cuts_of(mask: Bool, face: Bool) -> int:
         for _ in range(FITS):
             if near.sum() < MIN_LENGTH:
                 return 0
-            middle, normal = _line(points[near])
+            middle, normal = line_of(points[near])
             away = np.abs((points - middle) @ normal)
             near = away <= NEAR
         if np.abs((centres - middle) @ normal).max() < MIN_DEPTH:
@@ -59,7 +59,7 @@ def cuts_of(mask: Bool, face: Bool) -> int:
     return count if count and on.mean() >= MIN_SHARE and off[on].mean() <= MAX_DEVIATION else 0
 
 
-def _edge(mask: Bool, rest: Bool) -> tuple[Float, Int64]:
+def edge_of(mask: Bool, rest: Bool) -> tuple[Float, Int64]:
     """Return the middles (n, 2) of pixel sides between a region and the rest, x and y, and the piece of the edge of each."""
     piece = ndimage.label(ndimage.binary_dilation(mask) & rest, np.ones((3, 3)))[0]
     points, pieces = [np.empty((0, 2))], [np.empty(0, np.int64)]
@@ -73,7 +73,7 @@ def _edge(mask: Bool, rest: Bool) -> tuple[Float, Int64]:
     return np.concatenate(points), np.concatenate(pieces)
 
 
-def _line(points: Float) -> tuple[Float, Float]:
+def line_of(points: Float) -> tuple[Float, Float]:
     """Return middle and normal of the line through points (n, 2)."""
     middle = points.mean(axis=0)
     return middle, np.linalg.svd(points - middle, full_matrices=False)[2][1]

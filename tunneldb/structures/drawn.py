@@ -2,7 +2,7 @@
 
 Their outline is a triangle or quadrilateral with straight edges, and they are as even as the surface. Rust and damp end on
 straight edges only where the face itself ends. So a drawn region lies within its face, or goes around a pipe, or is one of
-several of the same width and contrast.
+several of the same width and contrast. Parts flush with the face and seams are of the design, too; see `parts`.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from scipy import ndimage
 from tunneldb.arrays import Bool, Float, Single
 from tunneldb.robust import MAD_TO_SIGMA
 from tunneldb.structures.cuts import cuts_of
+from tunneldb.structures.parts import REACH, is_attached, is_seam
 from tunneldb.structures.results import LeftOut
 from tunneldb.structures.solidity import closed
 
@@ -44,6 +45,9 @@ RING = 0.85
 MAX_BLUR = 0.35
 """Maximum loss of contrast beside a drawn edge: at an edge anywhere in a pixel, a quarter on the average."""
 
+MAX_UNEVEN_BLUR = 0.5
+"""The same of an uneven label: an edge in the middle of a pixel loses half."""
+
 MIN_REPEATED, ALIKE = 3, 0.15
 """Minimum number of like regions of one width that are a design, and their maximum difference in contrast."""
 
@@ -58,8 +62,9 @@ MAX_TURN_ERROR = 10.0
 ROUNDS = 3
 """Number of fits of the sides."""
 
-Design = Literal["label", "band"]
-"""Kinds of drawn regions: a label or plate lies within its face; a band goes around a pipe or repeats."""
+Design = Literal["label", "band", "part", "seam"]
+"""Kinds of drawn regions: a label, plate or window lies within its face; a band goes around a pipe or repeats; a part is
+attached to the rim of its face; a seam is a straight line."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +88,10 @@ class Patch:
         Loss of contrast beside its edge: the sum of both sides, in the contrast within it.
     cuts : int
         Number of straight lines that cut it off its face; see `cuts`.
+    pipe : bool
+        True on a pipe.
+    attached, seam : bool
+        True if it lies beyond the rim of its face, or is a part of a straight line; see `parts`.
     """
 
     mask: Bool
@@ -94,6 +103,14 @@ class Patch:
     sigma: float
     blur: float
     cuts: int
+    pipe: bool = False
+    attached: bool = False
+    seam: bool = False
+
+    @property
+    def even(self) -> bool:
+        """True if it is as even as the surface."""
+        return self.scatter <= (MAX_SCATTER + 1.5 / np.sqrt(self.mask.sum())) * self.sigma
 
     @property
     def stray(self) -> bool:
@@ -103,43 +120,46 @@ class Patch:
 
 def drawn(patches: list[Patch]) -> list[Design | None]:
     """Return the kind of each drawn region of a surface; None for the others."""
-    found, widths = [], []
-    for patch in patches:
-        straight, round_, regular = deviations(patch.mask)
-        even = patch.scatter <= (MAX_SCATTER + 1.5 / np.sqrt(patch.mask.sum())) * patch.sigma
-        clear = round_ >= max(MIN_ELLIPSE_RATIO * straight, MAX_DEVIATION)
-        sharp = patch.blur <= MAX_BLUR
-        within = patch.free >= MIN_FREE and sharp and regular <= MAX_DEVIATION
-        around = patch.ring and sharp and (patch.cuts == 2 or (patch.free >= MIN_FREE_OF_RING and patch.cuts == 1))
-        if around:
-            straight = 0.0  # what hides a part of a ring leaves it another outline
-        alone: Design | None = "band" if around else "label" if clear and within else None
-        found.append((straight <= MAX_DEVIATION and even, alone))
-        widths.append(_width(patch.mask))
+    found = [_alone(patch) for patch in patches]
+    widths = [_width(patch.mask) for patch in patches]
     out: list[Design | None] = []
-    for one, width, (fits, alone) in zip(patches, widths, found, strict=True):
-        like = sum(
-            _alike(one, other, width, wide)
-            for other, wide, (straight, _) in zip(patches, widths, found, strict=True)
-            if straight
+    for one, width, (straight, alone) in zip(patches, widths, found, strict=True):
+        like = straight and sum(
+            _alike(one, other, width, wide) for other, wide, (fits, _) in zip(patches, widths, found, strict=True) if fits
         )
-        out.append((alone or ("band" if like >= MIN_REPEATED else None)) if fits else None)
+        out.append(alone or ("band" if like >= MIN_REPEATED else None))
     paint = [patch.level for patch, kind in zip(patches, out, strict=True) if kind == "band"]
     return [
-        kind or ("band" if fits and _of_paint(patch.level, paint) else None)
-        for patch, kind, (fits, _) in zip(patches, out, found, strict=True)
+        kind or ("band" if not patch.stray and _of_paint(patch.level, paint) else None)
+        for patch, kind in zip(patches, out, strict=True)
     ]
 
 
+def _alone(patch: Patch) -> tuple[bool, Design | None]:
+    """Return True if a region is even and has straight sides, and what it is by itself."""
+    if patch.seam or patch.attached:
+        return False, "seam" if patch.seam else "part"
+    straight, round_, regular = deviations(patch.mask)
+    clear = round_ >= max(MIN_ELLIPSE_RATIO * straight, MAX_DEVIATION)
+    # Glass, displays and print scatter more than paint, so a clear rectangle needs not be even.
+    sharp = patch.blur <= (MAX_BLUR if patch.even else MAX_UNEVEN_BLUR)
+    if clear and sharp and regular <= MAX_DEVIATION and patch.free >= MIN_FREE:
+        return patch.even, "label"
+    around = patch.ring and patch.free >= MIN_FREE_OF_RING and patch.cuts == 1
+    if patch.even and sharp and (around or (patch.pipe and patch.cuts == 2)):
+        return True, "band"
+    return patch.even and straight <= MAX_DEVIATION, None
+
+
 def _of_paint(level: float, bands: list[float]) -> bool:
-    """Return True if a straight region has the contrast of several bands: a part of one, as at the end of a pipe."""
+    """Return True if a region has the contrast of several bands: a part of one, as at the end of a pipe or behind a cable."""
     return sum(abs(level - other) <= ALIKE * max(abs(level), abs(other)) for other in bands) >= MIN_REPEATED
 
 
 def left_out(patches: Iterable[Patch], kinds: Iterable[Design | None]) -> LeftOut:
     """Count regions that are drawn or stray."""
     count = Counter(kind or ("stray" if patch.stray else None) for patch, kind in zip(patches, kinds, strict=True))
-    return LeftOut(count["label"], count["band"], count["stray"])
+    return LeftOut(count["label"], count["band"], count["stray"], count["part"], count["seam"])
 
 
 def _width(mask: Bool) -> float:
@@ -192,7 +212,17 @@ def patch_of(
     free = float(within[outside].mean())
     edges = [value[side & known] for side in (rim, outside)]
     blur = 1.0 - float(np.median(edges[0]) - np.median(edges[1])) / level if level and all(map(len, edges)) else np.inf
-    return Patch(mask, pixel, free, ring, level, scatter, sigma, blur, cuts_of(wide, within))
+    region, near, contrast = _around(mask, corner, judged, drop)
+    seam = is_seam(region, contrast if level >= 0.0 else -contrast, near)
+    return Patch(
+        mask, pixel, free, ring, level, scatter, sigma, blur, cuts_of(wide, within), pipe, is_attached(region, near), seam
+    )  # fmt: skip
+
+
+def _around(mask: Bool, corner: tuple[int, int], judged: Bool, drop: Single) -> tuple[Bool, Bool, Single]:
+    """Return a region, and the judged pixels and contrast of its face around it, all with a margin of `REACH`."""
+    box = tuple(slice(at, at + size + 2 * REACH) for at, size in zip(corner, mask.shape, strict=True))
+    return np.pad(mask, REACH), np.pad(judged, REACH)[box], np.pad(drop, REACH)[box]
 
 
 def deviations(mask: Bool) -> tuple[float, float, float]:

@@ -274,8 +274,11 @@ def _judge(
             curves = [own.get(one.scan, levels.get(one.scan, UNKNOWN)) for one in seen]
             contrast = contrast_of(layout, part.face, seen, curves, found.noise)
             out.append((contrast, find_spots(contrast, pixels, scatter)))
-        out, omitted = without_design(out, pipe=bool(layout.models[parts[0].face][RADIUS] > 0.0))
-        out = [(contrast, extended(contrast, spots)) for contrast, spots in out]
+        pipe = bool(layout.models[parts[0].face][RADIUS] > 0.0)
+        out, omitted = without_design(out, pipe=pipe)
+        # A faint label may be complete only when its region is extended.
+        out, more = without_design([(contrast, extended(contrast, spots)) for contrast, spots in out], pipe=pipe)
+        omitted += more
         if turn == TURNS - 1 or not any(spots.spots for _, spots in out):
             break
         scatter.restore(before)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import Literal
 
 import numpy as np
@@ -183,22 +183,29 @@ class LeftOut:
     Attributes
     ----------
     labels, bands : int
-        Drawn regions: labels and plates; bands around pipes, and stripes.
+        Drawn regions: labels, plates and windows; bands around pipes, and stripes.
     stray : int
         Regions of stray points of other objects.
+    parts, seams : int
+        Parts attached to the rim of a face, in its plane; straight lines of one or two pixels, such as welds and joints.
     """
 
     labels: int = 0
     bands: int = 0
     stray: int = 0
+    parts: int = 0
+    seams: int = 0
 
     def __add__(self, other: LeftOut) -> LeftOut:
-        return LeftOut(self.labels + other.labels, self.bands + other.bands, self.stray + other.stray)
+        return LeftOut(*(one + more for one, more in zip(astuple(self), astuple(other), strict=True)))
 
     @property
     def statement(self) -> str | None:
         """Sentence about these regions; None if there are none."""
-        counts = ((self.labels, "label"), (self.bands, "painted band"), (self.stray, "region of stray points"))
+        counts = (
+            (self.labels, "label"), (self.bands, "painted band"), (self.stray, "region of stray points"),
+            (self.parts, "attached part"), (self.seams, "seam"),
+        )  # fmt: skip
         texts = [counted(count, one, "regions of stray points" if "stray" in one else "") for count, one in counts if count]
         return f"{', '.join(texts)} left out: they differ from their surface but are no spots" if texts else None
 

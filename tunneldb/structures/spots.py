@@ -110,8 +110,7 @@ def find_spots(face: FaceContrast, pixels: int, scatter: Scatter) -> FaceSpots:
     if not judged or face.points[face.judged].sum() < MIN_FACE_POINTS:
         return FaceSpots([], numbers, 0.0, 0)
     has_contrast = face.image.state == PixelState.LINING
-    drop = np.where(has_contrast, face.image.drop, np.int16(0)) * np.float32(STEP)
-    ratio, broad = significance(drop, has_contrast, face.image.sigma, pixels, scatter)
+    ratio, broad = significance(_contrast(face), has_contrast, face.image.sigma, pixels, scatter)
     empty = int((face.image.state == PixelState.EMPTY).sum())
     size = filter_size(judged / (judged + empty))
     found = [spot for kind, sign in _KINDS for spot in _outlined(face, kind, sign * ratio > 1.0, ratio, size)]
@@ -144,9 +143,14 @@ def extended(face: FaceContrast, spots: FaceSpots) -> FaceSpots:
 def _smooth(face: FaceContrast) -> Single:
     """Return the mean contrast about each pixel, dB, rows downwards."""
     has_contrast = face.image.state == PixelState.LINING
-    drop = np.where(has_contrast, face.image.drop, np.int16(0)) * np.float32(STEP)
     count = ndimage.uniform_filter(has_contrast.astype(np.float32), SMOOTHED, mode="constant")
-    return np.asarray(ndimage.uniform_filter(drop, SMOOTHED, mode="constant") / np.maximum(count, 1e-3))
+    return np.asarray(ndimage.uniform_filter(_contrast(face), SMOOTHED, mode="constant") / np.maximum(count, 1e-3))
+
+
+def _contrast(face: FaceContrast) -> Single:
+    """Return the contrast of each pixel, dB, rows downwards; 0 where it has none."""
+    has_contrast = face.image.state == PixelState.LINING
+    return np.where(has_contrast, face.image.drop, np.int16(0)) * np.float32(STEP)
 
 
 def _outlined(face: FaceContrast, kind: Literal["dark", "bright"], marked: Bool, ratio: Single, size: int) -> list[FoundSpot]:
@@ -183,7 +187,7 @@ def without_design(
     """Leave out the drawn regions of the faces of a surface, and stray points; count them."""
     patches = []
     for face, spots in faces:
-        drop = np.where(face.judged, face.image.drop[::-1], np.int16(0)) * np.float32(STEP)
+        drop = _contrast(face)[::-1]
         pixel = face.image.grid.pixel
         patches += [patch_of(spot.mask, spot.corner, pixel, drop, face.judged, face.sigma, pipe=pipe) for spot in spots.spots]
     kinds = drawn(patches)
