@@ -8,7 +8,7 @@ groups).
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -194,8 +194,7 @@ def fit(
     stay = np.arange(POSE * fixed)
     normal, rows = np.eye(count), []
     for reach in reaches:
-        leaning = replace(walls, batter=walls.batter + common[walls.side])
-        rows = _all_rows(scans, poses, leaning, placed, common, pairs, reach, fixed)
+        rows = _all_rows(scans, poses, walls.leaning(common[:2]), placed, common, pairs, reach, fixed)
         normal, right = _normal_equations(rows, count)
         normal[stay, stay] += FIXED_PRECISION
         offset = _prior_offset(poses, placed, ladders, common - usual)
