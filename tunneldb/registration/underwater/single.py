@@ -151,7 +151,9 @@ def start(scan: PreparedScan, walls: Walls, found: Sequence[LaserLadder]) -> lis
     UserError
         If it is upside down.
     """
-    if is_upside_down(scan.flat.points, scan.flat.walls):
+    if len(scan.flat.surface) == 0 and is_upside_down(
+        scan.flat.points, scan.flat.walls
+    ):  # a bed of concrete is as even as water
         raise UserError(f"{scan.cloud.path}: its bed is above it and the water below; check --up")
     fitted = _candidates(scan, walls, found)
     if not fitted:
