@@ -99,7 +99,7 @@ def test_flat_water_gives_the_tilt() -> None:
     place = rng.uniform(-1.0, 1.0, (60, 2))
     surface = np.column_stack([place, 0.01 * place[:, 0] + rng.normal(0.0, 0.002, 60)])
     noise = surface_noise(surface)
-    assert noise == pytest.approx(0.002, abs=0.0005)  # ripples are the least
+    assert noise == pytest.approx(0.002, abs=0.0005)
     rows = waterline_rows(Level(surface, noise), pose_at(0.0, 0.0), 0.0, 0, 0, firm=False)
     assert rows is not None
     weighted = rows.poses * weights_of(rows)[:, None]

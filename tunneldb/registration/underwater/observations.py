@@ -275,8 +275,8 @@ def profile_rows(patches: Patches, pose: Pose, walls: Walls, scan: int, columns:
     """Compare a scan's columns with the plan of the walls at the waterline: flanks of piers, ends, recesses, rough walls.
 
     Columns that face straight pieces of wall are left to `wall_rows`. The others lean as the wall beside them does, in its
-    direction: flanks stay upright, and a change of batter below the water is only that of walls along the canal. ``columns`` are the indices, among the common parameters, of the changes of batter of
-    either side.
+    direction: flanks stay upright, and a change of batter below the water is only that of walls along the canal. ``columns``
+    are the indices, among the common parameters, of the changes of batter of either side.
     """
     profile = walls.profile
     if len(profile.place) == 0:

@@ -198,6 +198,23 @@ def _candidates(scan: PreparedScan, walls: Walls, found: Sequence[LaserLadder]) 
         has_height = bool(fitted.ladders) or len(scan.level.points) >= MIN_LEVEL_POINTS
         if has_height and np.linalg.norm((fitted.pose.translation - first.translation)[:2]) < MAX_SLIDE:
             out.append(fitted)
+    return out + [other for one in out for other in _one_stile_beside(scan, patches, one, walls, found)]
+
+
+def _one_stile_beside(
+    scan: PreparedScan, patches: Patches, one: _Fitted, walls: Walls, found: Sequence[LaserLadder]
+) -> list[_Fitted]:
+    """Return the fits next to a fit at which one stile of a ladder would be the other: there a fit does not move on."""
+    out = []
+    space = one.pose.apply(scan.thin)
+    for k in one.ladders:
+        placed = found[k].placed
+        for gap in (-placed.gap, placed.gap):
+            shift = gap * placed.axes[0]
+            if likeness(space + shift, one.pose.translation + shift, placed) > MIN_LIKENESS:
+                pose = replace(one.pose, translation=one.pose.translation + shift)
+                beside = scan_of(scan.thin, patches, scan.smooth, scan.columns, scan.level, pose, one.ladders, found)
+                out.append(_seen(scan, _fit(beside, walls, found, FIRST_REACHES[-3:]), found))
     return out
 
 

@@ -18,7 +18,8 @@ MAX_SURFACE_SPREAD = 0.015  # m of the surface about its plane; the flat bottom 
 MAX_SPREAD_RATIO = 1.2  # of the surface and the bed: in a scan that is upside down the bed is above
 MAX_EDGE_ERROR = 0.2  # m between the surface and the upper edges of the walls
 MAX_WATER_SPREAD, MIN_BED_RATIO = 0.015, 4.0  # m; ratio of a bed's spread to the water's from which they are told apart
-MIN_SURFACE_SPREAD, MIN_SURFACE_NOISE = 0.005, 0.002  # m about the plane of a surface that is searched, and found: ripples
+MIN_SURFACE_SPREAD = 0.005  # m about the plane of a surface that is searched
+MIN_SURFACE_NOISE = 0.001  # m of a cell's mean, which ripples change little while the scan lasts
 MIN_FILLING = 0.25  # least number of points of a cell, relative to the median: cells at the rim of the ring are less certain
 ROUNDS = 10
 
@@ -128,7 +129,7 @@ def _flat(points: Float) -> tuple[Float, float]:
 
 
 def _plane(points: Float, least: float) -> tuple[Float, float]:
-    """Return the heights (n,) of points over a plane that is fitted to most of them, and their spread, m, at least ``least``."""
+    """Return the heights (n,) of points over a plane fitted to most of them, and their spread, m, at least ``least``."""
     design = np.column_stack([np.ones(len(points)), points[:, :2]])
     answer, scale = np.array([float(np.median(points[:, 2])), 0.0, 0.0]), np.inf
     for _ in range(ROUNDS):
