@@ -204,14 +204,18 @@ def _candidates(scan: PreparedScan, walls: Walls, found: Sequence[LaserLadder]) 
 def _one_stile_beside(
     scan: PreparedScan, patches: Patches, one: _Fitted, walls: Walls, found: Sequence[LaserLadder]
 ) -> list[_Fitted]:
-    """Return the fits next to a fit at which one stile of a ladder would be the other: there a fit does not move on."""
+    """Return the fits next to a fit at which a ladder is seen better with one of its stiles as the other.
+
+    A fit does not get there by itself.
+    """
     out = []
     space = one.pose.apply(scan.thin)
     for k in one.ladders:
         placed = found[k].placed
+        here = likeness(space, one.pose.translation, placed)
         for gap in (-placed.gap, placed.gap):
             shift = gap * placed.axes[0]
-            if likeness(space + shift, one.pose.translation + shift, placed) > MIN_LIKENESS:
+            if likeness(space + shift, one.pose.translation + shift, placed) > here:
                 pose = replace(one.pose, translation=one.pose.translation + shift)
                 beside = scan_of(scan.thin, patches, scan.smooth, scan.columns, scan.level, pose, one.ladders, found)
                 out.append(_seen(scan, _fit(beside, walls, found, FIRST_REACHES[-3:]), found))
