@@ -70,3 +70,11 @@ def test_the_bottom_of_a_boat_beside_the_water_is_no_surface() -> None:
     bottom = boat[(np.abs(boat[:, 0]) < 3.0) & (boat[:, 1] < -1.2)]
     found = find_surface(np.concatenate([plane(BED, 0.05, 1), ring, bottom]), WALLS, TOP - 0.1)
     assert len(found) == 0 or np.ptp(found[:, 2]) < 0.03
+
+
+def test_a_head_close_below_the_surface_sees_a_small_ring_of_it() -> None:
+    rng = np.random.default_rng(9)
+    reach, turn = rng.uniform(0.3, 0.6, 500), rng.uniform(0.0, 2.0 * np.pi, 500)
+    ring = np.column_stack([reach * np.cos(turn), reach * np.sin(turn), 0.5 + rng.normal(0.0, 0.005, 500)])
+    found = find_surface(np.concatenate([plane(BED, 0.05, 1), ring]), WALLS, 0.42)
+    assert np.median(found[:, 2]) == pytest.approx(0.5, abs=0.002)

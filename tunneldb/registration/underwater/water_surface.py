@@ -10,7 +10,7 @@ from tunneldb.arrays import Float
 from tunneldb.robust import MAD_TO_SIGMA
 
 CELL = 0.5  # m in plan
-MIN_POINTS, MIN_CELLS = 4, 12  # of a cell, above and below; of such cells
+MIN_POINTS, MIN_CELLS = 4, 8  # of a cell, above and below; of such cells
 MIN_UP = 0.15  # m above or below the sonar
 SHARE_INSIDE = 0.75  # of the width between the walls
 MAX_SPREAD = 0.04  # m of a mirror about its plane
