@@ -15,8 +15,8 @@ from tunneldb.errors import UserError
 from tunneldb.registration.underwater import Registration, SonarCloud, SonarPose, register
 from tunneldb.registration.underwater.chain import Reliefs, agreement
 from tunneldb.registration.underwater.laser_ladders import find_laser_ladders
-from tunneldb.registration.underwater.observations import Pose, pose_derivatives
-from tunneldb.registration.underwater.single import prepare
+from tunneldb.registration.underwater.observations import Pose, find_patches, pose_derivatives
+from tunneldb.registration.underwater.single import _Fitted, _one_stile_beside, prepare
 from tunneldb.registration.underwater.walls import find_walls
 
 pytestmark = pytest.mark.slow
@@ -222,3 +222,16 @@ def test_a_scan_of_the_laser_is_no_scan_of_the_sonar(scene: Scene) -> None:
     own = (scene.laser - scene.laser.mean(axis=0))[::4]
     with pytest.raises(UserError, match=r"laser\.xyz: no bed between its walls"):
         register(scene.laser, [SonarCloud(Path("laser.xyz"), own, 1)], scene.canal.measured(), LEVEL)
+
+
+def test_a_pose_one_stile_beside_leads_to_the_right_one(scene: Scene) -> None:
+    walls = find_walls(scene.laser - [*ORIGIN[:2], LEVEL])
+    ladders = find_laser_ladders(scene.laser - [*ORIGIN[:2], LEVEL], walls, scene.canal.measured())
+    scan = scene.scans[0]
+    prepared = prepare(SonarCloud(Path("s0.xyz"), scan.points, 1), walls)
+    true = scan.translation - [*ORIGIN[:2], LEVEL]
+    k = int(np.argmin([np.linalg.norm(one.placed.origin[:2] - true[:2]) for one in ladders]))
+    placed = ladders[k].placed
+    wrong = Pose(scan.rotation, true + placed.gap * placed.axes[0], scan.scale)
+    found = _one_stile_beside(prepared, find_patches(prepared.thin), _Fitted(wrong, (k,), 0), walls, ladders)
+    assert min(np.linalg.norm(one.pose.translation - true) for one in found) < 0.05

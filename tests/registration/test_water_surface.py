@@ -51,3 +51,30 @@ def test_a_scan_with_the_bed_above_is_upside_down() -> None:
     assert is_upside_down(points * [1.0, -1.0, -1.0], WALLS)
     level_bed = np.concatenate([plane(BED, 0.0, 1), plane(TOP, 0.0, 2)])
     assert not is_upside_down(level_bed * [1.0, -1.0, -1.0], WALLS)  # nothing tells them apart
+
+
+def test_a_ring_of_echoes_gives_the_tilt_of_a_scan_that_is_not_level() -> None:
+    rng = np.random.default_rng(8)
+    reach, turn = rng.uniform(0.3, 0.9, 600), rng.uniform(0.0, 2.0 * np.pi, 600)
+    x, y = reach * np.cos(turn), reach * np.sin(turn)
+    ring = np.column_stack([x, y, TOP + 0.03 * x - 0.02 * y + rng.normal(0.0, 0.003, 600)])
+    rim = np.column_stack([rng.uniform(0.9, 1.0, (5, 2)), np.full(5, TOP + 0.03)])  # few echoes of a wide beam, 3 cm off
+    found = find_surface(np.concatenate([plane(BED, 0.05, 1), ring, rim]), WALLS, TOP)
+    slope = np.linalg.lstsq(np.column_stack([np.ones(len(found)), found[:, :2]]), found[:, 2], rcond=None)[0]
+    assert slope[1:] == pytest.approx([0.03, -0.02], abs=0.002)
+
+
+def test_the_bottom_of_a_boat_beside_the_water_is_no_surface() -> None:
+    water, boat = plane(TOP, 0.0, 2), plane(TOP - 0.17, 0.0, 3)
+    ring = water[np.hypot(water[:, 0], water[:, 1]) < 0.8]
+    bottom = boat[(np.abs(boat[:, 0]) < 3.0) & (boat[:, 1] < -1.2)]
+    found = find_surface(np.concatenate([plane(BED, 0.05, 1), ring, bottom]), WALLS, TOP - 0.1)
+    assert len(found) == 0 or np.ptp(found[:, 2]) < 0.03
+
+
+def test_a_head_close_below_the_surface_sees_a_small_ring_of_it() -> None:
+    rng = np.random.default_rng(9)
+    reach, turn = rng.uniform(0.3, 0.6, 500), rng.uniform(0.0, 2.0 * np.pi, 500)
+    ring = np.column_stack([reach * np.cos(turn), reach * np.sin(turn), 0.5 + rng.normal(0.0, 0.005, 500)])
+    found = find_surface(np.concatenate([plane(BED, 0.05, 1), ring]), WALLS, 0.42)
+    assert np.median(found[:, 2]) == pytest.approx(0.5, abs=0.002)

@@ -8,7 +8,7 @@ groups).
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -27,6 +27,7 @@ from tunneldb.registration.underwater.observations import (
     wall_rows,
     waterline_rows,
 )
+from tunneldb.registration.underwater.sound_speed import sound_rows
 from tunneldb.registration.underwater.walls import Walls
 from tunneldb.registration.underwater.water_surface import Level
 
@@ -44,8 +45,8 @@ ZERO_SIGMA, ZERO_PRIOR_SIGMA = 0.0015, 0.0003
 SLANT_USUAL, SLANT_SIGMA = 1.5, 1.0
 NEARER_SIGMA = (0.0005, 0.002)  # of the shares by which relief of walls and of the bed seems nearer along the canal
 # Parameters common to all scans except those of ladders: changes of batter of either side, depth behind a bar's near
-# surface, height of the waterline, zero on masonry, two slants, two of those shares
-COMMON = 9
+# surface, height of the waterline, zero on masonry, two slants, two of those shares, mean range scale less 1
+COMMON = 10
 LADDER_TURN, LADDER_SHIFT = 0.0005, 0.002  # least standard deviations of a ladder by the laser, rad and m
 # rad: common error of slanting beams on a rough wall, 0.6 mm over 2 m of its height; not visible in a single scan
 SLANT = 0.0003
@@ -57,6 +58,7 @@ SURROUNDINGS = 0.6  # m around a ladder, more than the error of a first pose
 FIXED_PRECISION = 1e8  # precision of fixed parameters
 MAX_SINGULAR_SHARE = 1e-12  # share of the largest eigenvalue up to which a direction is undetermined
 UNKNOWN_VARIANCE = 1e4  # variance of such a direction
+STATED_KINDS = ("waterline", "sound")  # kinds whose last row has a stated error: the water's mean height, the scale
 KEYS_OF_PLACES = {"wall": 0, "scan": 0, "profile": 1}  # kinds whose groups are places, the same in all scans
 
 
@@ -183,8 +185,9 @@ def fit(
     placed = [ladder.placed for ladder in ladders]
     count = POSE * len(scans) + COMMON + 6 * len(ladders)
     radius = max((ladder.placed.ladder.diameter / 2.0 for ladder in ladders), default=0.0)
-    usual = np.array([0.0, 0.0, DEPTH_SHARE * radius, 0.0, 0.0, SLANT_USUAL, SLANT_USUAL, 0.0, 0.0])
+    usual = np.array([0.0, 0.0, DEPTH_SHARE * radius, 0.0, 0.0, SLANT_USUAL, SLANT_USUAL, 0.0, 0.0, 0.0])
     common = usual.copy()
+    common[9] = float(np.median([pose.scale for pose in poses])) - 1.0 if poses else 0.0
     precision = _prior(len(scans), ladders, radius)
     if not any(scan.ladders for scan in scans):
         precision[POSE * len(scans) + 3, POSE * len(scans) + 3] = 1.0 / WATERLINE_FIRM_SIGMA**2
@@ -194,8 +197,7 @@ def fit(
     stay = np.arange(POSE * fixed)
     normal, rows = np.eye(count), []
     for reach in reaches:
-        leaning = replace(walls, batter=walls.batter + common[walls.side])
-        rows = _all_rows(scans, poses, leaning, placed, common, pairs, reach, fixed)
+        rows = _all_rows(scans, poses, walls.leaning(common[:2]), placed, common, pairs, reach, fixed)
         normal, right = _normal_equations(rows, count)
         normal[stay, stay] += FIXED_PRECISION
         offset = _prior_offset(poses, placed, ladders, common - usual)
@@ -234,10 +236,12 @@ def _all_rows(
         rows += [found] if found is not None else []
         found = waterline_rows(scan.level, poses[i], float(common[3]), i, first + 3, firm=not scan.ladders)
         rows += [found] if found is not None else []
+    if len(scans) > 1:
+        rows += [sound_rows(pose, float(common[9]), i, first + np.array([9])) for i, pose in enumerate(poses)]
     for i, j in pairs:
         together = (poses[i], poses[j])
-        columns = first + np.arange(5, COMMON)
-        found = overlap_rows(scans[i].smooth, scans[j].smooth, together, common[5:], (i, j), columns, reach)
+        columns = first + np.arange(5, 9)
+        found = overlap_rows(scans[i].smooth, scans[j].smooth, together, common[5:9], (i, j), columns, reach)
         rows += [found] if found is not None else []
     return rows
 
@@ -298,6 +302,7 @@ def _prior(scans: int, ladders: Sequence[LaserLadder], radius: float) -> Float:
         SLANT_SIGMA,
         SLANT_SIGMA,
         *NEARER_SIGMA,
+        SCALE_SIGMA,
     )
     for k, ladder in enumerate(ladders):
         first = POSE * scans + COMMON + 6 * k
@@ -340,7 +345,7 @@ def _sandwich(rows: Sequence[Rows], normal: Float, precision: Float, spread: Flo
             mine = number == group
             leverage = weighted[mine].T @ design[mine] @ own
             scores = np.zeros((2, len(normal)))
-            if one.kind != "waterline" or name < len(one.residual) - 1:  # the error of the water's mean height is stated
+            if one.kind not in STATED_KINDS or name < len(one.residual) - 1:
                 scores[0, columns] = np.linalg.solve(np.eye(len(columns)) - leverage, score[mine].sum(axis=0))
             scores[1, columns] = weighted[mine].T @ one.shared[mine]
             keys.append((KEYS_OF_PLACES.get(one.kind, place + 2), int(name)))

@@ -204,7 +204,7 @@ def _open_directions(alternatives: Sequence[Alternative]) -> tuple[str, ...]:
 def _residuals(rows: Sequence[Rows], scan: int, names: Sequence[str]) -> tuple[Residual, ...]:
     out = []
     for one in rows:
-        if scan not in (one.scan, one.other):
+        if scan not in (one.scan, one.other) or one.kind == "sound":
             continue
         kind, name = ("wall", "plan") if one.kind == "profile" else (one.kind, one.name)
         if one.other is not None:

@@ -1,4 +1,4 @@
-"""First pose of a sonar scan, before any fit: levelled by walls and bed, turned along the canal, matched to a ladder.
+"""First pose of a sonar scan, before any fit: levelled by walls, bed and water, turned along the canal, matched to a ladder.
 
 The walls leave a half turn, the place along the canal and the height open. They are found by template matching with the
 expected image of a ladder below the water, seen across the canal (Lewis, 1995, normalised cross-correlation), for each
@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import gaussian_filter
 from scipy.signal import fftconvolve
+from scipy.spatial.transform import Rotation
 
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
@@ -110,14 +111,37 @@ def level(points: Float, up: int, widths: tuple[float, float]) -> LevelScan:
         turn = np.array([[1.0, yaw, pitch], [-yaw, 1.0, -roll], [-pitch, roll, 1.0]])
         left, _, right = np.linalg.svd(turn)
         rotation = left @ right @ rotation
-    turned = points @ rotation.T
-    if np.degrees(np.arccos(np.clip(rotation[2, 2] * up, -1.0, 1.0))) > np.degrees(MAX_TILT):
+    flat = _level_scan(points, rotation, (low, high), slopes, bed)
+    if len(flat.surface):
+        flat = _levelled_by_water(points, flat)
+    if np.degrees(np.arccos(np.clip(flat.rotation[2, 2] * up, -1.0, 1.0))) > np.degrees(MAX_TILT):
         raise UserError("the scan is tilted by more than 15°; check --up")
-    edges = find_waterline(turned, (low, high), slopes)
+    return flat
+
+
+def _level_scan(
+    points: Float, rotation: Float, walls: tuple[float, float], slopes: tuple[float, float], bed: float
+) -> LevelScan:
+    """Return the scan at a rotation, with the water's level."""
+    turned = points @ rotation.T
+    edges = find_waterline(turned, walls, slopes)
     top = float(np.median(edges[:, 2])) if len(edges) else float(np.percentile(turned[:, 2], TOP_PERCENTILE))
-    surface = find_surface(turned, (low, high), top)
+    surface = find_surface(turned, walls, top)
     top = float(np.median(surface[:, 2])) if len(surface) else top
-    return LevelScan(rotation, (low, high), slopes, turned, bed, edges, surface, top)
+    return LevelScan(rotation, walls, slopes, turned, bed, edges, surface, top)
+
+
+def _levelled_by_water(points: Float, flat: LevelScan) -> LevelScan:
+    """Return the scan levelled by the water's surface: rock walls and a bed are not level; itself if its surface is lost."""
+    design = np.column_stack([np.ones(len(flat.surface)), flat.surface[:, :2]])
+    _, along, across = np.linalg.lstsq(design, flat.surface[:, 2], rcond=None)[0]
+    rotation = Rotation.from_rotvec([-across, along, 0.0]).as_matrix() @ flat.rotation
+    turned = points @ rotation.T
+    near = turned[np.linalg.norm(turned[:, :2], axis=1) < MAX_RANGE]
+    first, second = (_wall_plane(near, place) for place in flat.walls)
+    walls = first[0], second[0]
+    found = _level_scan(points, np.asarray(rotation), walls, (first[2], second[2]), _bed_slope(near, *walls)[1])
+    return found if len(found.surface) else flat
 
 
 def _about_z(angle: float) -> Float:

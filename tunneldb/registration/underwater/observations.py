@@ -251,7 +251,7 @@ def wall_rows(
         + (walls.sigma_batter[piece] * centre[:, 2]) ** 2
     )
     shared = np.hypot(SHARED, BATTER_SHARED * centre[:, 2])
-    batter = centre[:, 2] / np.sqrt(1.0 + walls.batter[piece] ** 2)
+    batter = walls.along[piece] * centre[:, 2] / np.sqrt(1.0 + walls.batter[piece] ** 2)
     facing_course = np.column_stack([walls.course[piece], walls.batter[piece]])
     facing_course /= np.linalg.norm(facing_course, axis=1)[:, None]
     nearer = nearer_by_slant(centre, pose.translation, normal)
@@ -275,8 +275,8 @@ def profile_rows(patches: Patches, pose: Pose, walls: Walls, scan: int, columns:
     """Compare a scan's columns with the plan of the walls at the waterline: flanks of piers, ends, recesses, rough walls.
 
     Columns that face straight pieces of wall are left to `wall_rows`. The others lean as the wall beside them does, in its
-    direction: flanks stay upright. ``columns`` are the indices, among the common parameters, of the changes of batter of
-    either side.
+    direction: flanks stay upright, and a change of batter below the water is only that of walls along the canal. ``columns``
+    are the indices, among the common parameters, of the changes of batter of either side.
     """
     profile = walls.profile
     if len(profile.place) == 0:
@@ -301,7 +301,7 @@ def profile_rows(patches: Patches, pose: Pose, walls: Walls, scan: int, columns:
     if keep.sum() < MIN_PROFILE_PATCHES:
         return None
     near, centre, off, normal = near[keep], centre[keep], off[keep], normal[keep]
-    side, lean = walls.side[piece[keep]], cosine[keep] * centre[:, 2]
+    side, lean = walls.side[piece[keep]], walls.along[piece[keep]] * cosine[keep] * centre[:, 2]
     sigma = np.sqrt(patches.spread[near] ** 2 / patches.count[near] + RELIEF**2 + PROFILE_NOISE**2)
     shared = np.hypot(PROFILE_SHARED, profile.sigma(centre[:, 2]))
     upright_normal = np.column_stack([normal, np.zeros(len(normal))])

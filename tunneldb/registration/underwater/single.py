@@ -151,7 +151,9 @@ def start(scan: PreparedScan, walls: Walls, found: Sequence[LaserLadder]) -> lis
     UserError
         If it is upside down.
     """
-    if is_upside_down(scan.flat.points, scan.flat.walls):
+    if len(scan.flat.surface) == 0 and is_upside_down(
+        scan.flat.points, scan.flat.walls
+    ):  # a bed of concrete is as even as water
         raise UserError(f"{scan.cloud.path}: its bed is above it and the water below; check --up")
     fitted = _candidates(scan, walls, found)
     if not fitted:
@@ -196,6 +198,27 @@ def _candidates(scan: PreparedScan, walls: Walls, found: Sequence[LaserLadder]) 
         has_height = bool(fitted.ladders) or len(scan.level.points) >= MIN_LEVEL_POINTS
         if has_height and np.linalg.norm((fitted.pose.translation - first.translation)[:2]) < MAX_SLIDE:
             out.append(fitted)
+    return out + [other for one in out for other in _one_stile_beside(scan, patches, one, walls, found)]
+
+
+def _one_stile_beside(
+    scan: PreparedScan, patches: Patches, one: _Fitted, walls: Walls, found: Sequence[LaserLadder]
+) -> list[_Fitted]:
+    """Return the fits next to a fit at which a ladder is seen better with one of its stiles as the other.
+
+    A fit does not get there by itself.
+    """
+    out = []
+    space = one.pose.apply(scan.thin)
+    for k in one.ladders:
+        placed = found[k].placed
+        here = likeness(space, one.pose.translation, placed)
+        for gap in (-placed.gap, placed.gap):
+            shift = gap * placed.axes[0]
+            if likeness(space + shift, one.pose.translation + shift, placed) > here:
+                pose = replace(one.pose, translation=one.pose.translation + shift)
+                beside = scan_of(scan.thin, patches, scan.smooth, scan.columns, scan.level, pose, one.ladders, found)
+                out.append(_seen(scan, _fit(beside, walls, found, FIRST_REACHES[-3:]), found))
     return out
 
 

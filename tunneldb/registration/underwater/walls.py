@@ -34,6 +34,7 @@ TUKEY = 4.685
 MAX_WALL_DISTANCE = 0.05  # m
 EDGE_BIN = 0.02  # m of height, for the lower edge of the walls
 COURSE_REACH, COURSE_COSINE = 4.0, 0.9  # m; of the normals of one wall
+CANAL_REACH = 8.0  # m in plan: longer than piers and recesses
 USUAL_HEIGHTS = (0.1, 0.6)  # heights, m, between which walls have their usual point density
 
 
@@ -60,6 +61,9 @@ class Walls:
     course : (k, 2) float64 array
         Unit normals of the course of the wall. A piece's own normal follows dents of the wall and errors of its fit, which
         tell nothing about the place along it.
+    along : (k,) bool array
+        True for pieces along the canal. A change of batter of a side below the water is theirs; ends, flanks and noses of piers
+        across the canal are other structures.
     """
 
     foot: Float
@@ -71,6 +75,7 @@ class Walls:
     rough: Bool
     profile: Profile
     course: Float
+    along: Bool
 
     @cached_property
     def tree(self) -> cKDTree:
@@ -81,13 +86,17 @@ class Walls:
         """Return the pieces of a mask (k,)."""
         return Walls(
             self.foot[keep], self.normal[keep], self.batter[keep], self.sigma[keep], self.sigma_batter[keep], self.side[keep],
-            self.rough[keep], self.profile, self.course[keep],
+            self.rough[keep], self.profile, self.course[keep], self.along[keep],
         )  # fmt: skip
 
     def distance(self, points: Float, piece: Int64) -> Float:
         """Return the distance (n,), m, of points (n, 3) in front of the pieces (n,), square to the wall."""
         away = ((points[:, :2] - self.foot[piece, :2]) * self.normal[piece]).sum(axis=1) + self.batter[piece] * points[:, 2]
         return np.asarray(away / np.sqrt(1.0 + self.batter[piece] ** 2))
+
+    def leaning(self, change: Float) -> Walls:
+        """Return the walls with a change (2,) of the batter of either side."""
+        return replace(self, batter=self.batter + change[self.side] * self.along)
 
     def normals(self, piece: Int64) -> Float:
         """Return the unit normals (n, 3) of pieces (n,), towards the water."""
@@ -137,9 +146,10 @@ def find_walls(points: Float) -> Walls:
         rough | (rough.mean() > MAX_ROUGH_SHARE),
         find_profile(points),
         normal,
+        np.ones(len(foot), np.bool_),
     )
     oriented = _orient(walls)
-    return replace(oriented, course=_course(oriented))
+    return replace(oriented, course=_course(oriented), along=_along(oriented))
 
 
 def lower_edge(points: Float, walls: Walls) -> float:
@@ -209,6 +219,17 @@ def _course(walls: Walls) -> Float:
     i, j = i[same], j[same]
     total = walls.normal + np.column_stack([np.bincount(i, walls.normal[j, k], len(walls.normal)) for k in (0, 1)])
     return np.asarray(total / np.linalg.norm(total, axis=1)[:, None])
+
+
+def _along(walls: Walls) -> Bool:
+    """Return True for the pieces (k,) that face across the canal, as most pieces within CANAL_REACH do, on either side."""
+    near = walls.tree.query_pairs(CANAL_REACH, output_type="ndarray")
+    i, j = np.concatenate([near, near[:, ::-1]]).T
+    twice = 2.0 * np.arctan2(walls.normal[:, 1], walls.normal[:, 0])  # opposite normals are the same direction
+    own = np.exp(1j * twice)
+    count = len(twice)
+    total = own + np.bincount(i, own.real[j], count) + 1j * np.bincount(i, own.imag[j], count)
+    return np.asarray(np.cos(0.5 * np.angle(own * np.conj(total))) > COURSE_COSINE)
 
 
 def _opposite(foot: Float, normal: Float) -> tuple[Float, Bool]:
