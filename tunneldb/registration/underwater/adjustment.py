@@ -37,6 +37,7 @@ BATTER_SIGMA = 0.05  # prior standard deviation of the change of batter at the w
 # 1 - (4/3) / (pi/2); and its uncertainty under other laws.
 DEPTH_SHARE, DEPTH_SPREAD = 1.0 - (4.0 / 3.0) / (np.pi / 2.0), 0.2
 WATERLINE_SIGMA = 0.03  # m: common offset of the water in all scans from the level that is given
+WATERLINE_FREEDOM = 3.0  # degrees of freedom of that offset
 WATERLINE_FIRM_SIGMA = 0.0003  # m: nearly fixed where no ladder shows it; its uncertainty enters the covariance only
 # Prior standard deviations of the sonar's zero on masonry, from stones and joints in its beam, m: some of RELIEF. Walls
 # separate it from scale as poorly as ladders do, so it is nearly fixed, and its uncertainty enters the covariance only.
@@ -153,7 +154,7 @@ def adjust(scans: Sequence[Scan], walls: Walls, ladders: Sequence[LaserLadder], 
     spread = fitted.precision.copy()  # precision of the prior, for the covariance
     zero, water = POSE * len(scans) + 4, POSE * len(scans) + 3
     spread[zero, zero] *= (ZERO_SIGMA / ZERO_PRIOR_SIGMA) ** 2
-    spread[water, water] *= (WATERLINE_SIGMA * np.sqrt(spread[water, water])) ** 2
+    spread[water, water] *= max((WATERLINE_SIGMA * np.sqrt(spread[water, water])) ** 2, 1.0)
     covariance = _sandwich(fitted.rows, fitted.normal, fitted.precision, spread)
     blocks = [slice(POSE * i, POSE * (i + 1)) for i in range(len(scans))]
     for block in blocks:
@@ -189,8 +190,7 @@ def fit(
     common = usual.copy()
     common[9] = float(np.median([pose.scale for pose in poses])) - 1.0 if poses else 0.0
     precision = _prior(len(scans), ladders, radius)
-    if not any(scan.ladders for scan in scans):
-        precision[POSE * len(scans) + 3, POSE * len(scans) + 3] = 1.0 / WATERLINE_FIRM_SIGMA**2
+    firm, water = not any(scan.ladders for scan in scans), POSE * len(scans) + 3
     plan = np.add.outer(POSE * np.arange(len(scans)), [3, 4]).ravel()
     damping = np.zeros((count, count))
     damping[plan, plan] = 1.0 / MAX_DRIFT**2
@@ -202,6 +202,7 @@ def fit(
         normal[stay, stay] += FIXED_PRECISION
         offset = _prior_offset(poses, placed, ladders, common - usual)
         offset[stay] = 0.0
+        precision[water, water] = 1.0 / WATERLINE_FIRM_SIGMA**2 if firm else _water_precision(float(common[3]))
         change = -_inverse(normal + precision + damping, 0.0) @ (right + precision @ offset)
         change[stay] = 0.0
         for i, pose in enumerate(poses):
@@ -309,6 +310,14 @@ def _prior(scans: int, ladders: Sequence[LaserLadder], radius: float) -> Float:
         own = np.sqrt(np.diag(ladder.covariance)[:6])
         sigma[first : first + 6] = np.hypot(own, [LADDER_TURN] * 3 + [LADDER_SHIFT] * 3)
     return np.diag(1.0 / sigma**2)
+
+
+def _water_precision(offset: float) -> float:
+    """Return the weight of the given water level, 1/m², once ladders show its offset, m: that of Student's t.
+
+    Water usually stands within centimetres of its level on another day, and sometimes decimetres off.
+    """
+    return 1.0 / (WATERLINE_SIGMA**2 * (1.0 + (offset / WATERLINE_SIGMA) ** 2 / WATERLINE_FREEDOM))
 
 
 def _prior_offset(

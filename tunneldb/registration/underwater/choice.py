@@ -84,7 +84,7 @@ def _ladder_deviation(own: Float, placed: PlacedLadder, pose: Pose) -> Float:
     axis = np.where(which < 2, 1, 0)
     ray[np.arange(len(ray)), axis] = 0.0
     ray /= np.linalg.norm(ray, axis=1)[:, None]
-    vector = away + placed.ladder.diameter / 2.0 * ray
+    vector = away + placed.radius(which)[:, None] * ray
     along = (vector * ray).sum(axis=1)
     across = np.maximum((vector**2).sum(axis=1) - along**2, 0.0)
     return np.asarray((along / RANGE_NOISE) ** 2 + across / (BEAM_SIGMA * reach) ** 2)

@@ -29,12 +29,15 @@ class PlacedLadder:
         Rows: across, up, out.
     gap : float
         Distance between the stiles' axes, m.
+    stile : float
+        Diameter of the stiles, m; often they are thicker than the rungs.
     """
 
     ladder: Ladder
     origin: Float
     axes: Float
     gap: float
+    stile: float
 
     def to_ladder(self, points: Float) -> Float:
         """Return points (n, 3) in the ladder's own axes."""
@@ -44,10 +47,17 @@ class PlacedLadder:
         """Return points in space, the inverse of `to_ladder`."""
         return np.asarray(points @ self.axes + self.origin)
 
-    def moved(self, turn: Float, shift: Float, wider: float = 0.0) -> PlacedLadder:
-        """Return it turned by a rotation vector (3,) about its origin, then shifted (3,), with a gap wider by ``wider`` m."""
+    def moved(self, turn: Float, shift: Float, wider: float = 0.0, thicker: float = 0.0) -> PlacedLadder:
+        """Return it turned by a rotation vector (3,) about its origin, then shifted (3,).
+
+        Its gap is wider by ``wider`` m, its stiles are thicker by ``thicker`` m.
+        """
         axes = np.asarray(Rotation.from_rotvec(turn).apply(self.axes))
-        return replace(self, origin=self.origin + shift, axes=axes, gap=self.gap + wider)
+        return replace(self, origin=self.origin + shift, axes=axes, gap=self.gap + wider, stile=self.stile + thicker)
+
+    def radius(self, element: Int64) -> Float:
+        """Return the radius of elements (n,), numbered as in `elements`, m."""
+        return np.where(element < 2, self.stile / 2.0, self.ladder.diameter / 2.0)
 
     def elements(self) -> tuple[Float, Float]:
         """Return the ends (r + 2, 3), (r + 2, 3) of the axes of the stiles, then of the rungs, in the ladder's own axes."""

@@ -31,6 +31,7 @@ MAX_POINTS = 4000
 FIRST_FIT_POINTS = 600  # points of a first fit
 LEANING = np.radians(np.arange(-15.0, 15.1, 0.5))  # sideways
 BIN = 0.005  # m
+STILE_SIGMA = 0.02  # m by which the diameter of stiles usually differs from that of rungs
 NOISE = 0.004  # expected noise of laser points on a cylinder, m
 STARTS = 8
 MAX_LADDERS = 6  # after which a cluster that none fits is no ladder
@@ -244,11 +245,11 @@ def _fit_cluster(
     cost, placed, covariance = refined[0]
     own = placed.to_ladder(cluster)
     which, away = nearest_element(own, placed)
-    residual = np.linalg.norm(away, axis=1) - ladder.diameter / 2.0
+    residual = np.linalg.norm(away, axis=1) - placed.radius(which)
     close = np.abs(residual) < 5.0 * NOISE
     if close.mean() < 0.5:
         return None
-    inside = np.abs(own[:, 0]) < placed.gap / 2.0 - ladder.diameter
+    inside = np.abs(own[:, 0]) < placed.gap / 2.0 - max(ladder.diameter, placed.stile)
     between = close & inside
     if not inside.any() or float(np.median(np.abs(residual[inside]))) > links.rung_error:  # its gaps differ
         return None
@@ -322,7 +323,7 @@ def _stiles(cluster: Float, out: Float, ladder: Ladder) -> PlacedLadder | None:
     turned_across = across * np.cos(lean) + up * np.sin(lean)
     turned_up = -across * np.sin(lean) + up * np.cos(lean)
     origin = middle + turned_across * (left + gap / 2.0) - normal * ladder.diameter / 2.0
-    return PlacedLadder(ladder, origin, np.vstack([turned_across, turned_up, normal]), gap)
+    return PlacedLadder(ladder, origin, np.vstack([turned_across, turned_up, normal]), gap, ladder.diameter)
 
 
 def _shifts(own: Float, ladder: Ladder, gap: float) -> list[tuple[float, float]]:
@@ -349,17 +350,18 @@ def _shifts(own: Float, ladder: Ladder, gap: float) -> list[tuple[float, float]]
 
 
 def _refine(cluster: Float, start: PlacedLadder, max_points: int) -> tuple[float, PlacedLadder, Float]:
-    """Fit turn, shift and gap by robust least squares; return cost, ladder and covariance."""
-    radius = start.ladder.diameter / 2.0
+    """Fit turn, shift, gap and thickness of the stiles by robust least squares; return cost, ladder and covariance."""
+    usual = start.ladder.diameter
 
     def compared(change: Float) -> tuple[PlacedLadder, Float, Int64, Float]:
-        placed = start.moved(change[:3], change[3:6], float(change[6]))
+        placed = start.moved(change[:3], change[3:6], float(change[6]), float(change[7]))
         own = placed.to_ladder(cluster)
         return placed, own, *nearest_element(own, placed)
 
     def residual(change: Float) -> Float:
-        _, _, _, away = compared(change)
-        return np.asarray((np.linalg.norm(away, axis=1) - radius) / NOISE)
+        placed, _, which, away = compared(change)
+        off = (np.linalg.norm(away, axis=1) - placed.radius(which)) / NOISE
+        return np.append(off, (placed.stile - usual) / STILE_SIGMA)
 
     def derivatives(change: Float) -> Float:
         """Return the derivatives of the residuals: movement of a bar's axis towards a point reduces its distance."""
@@ -367,15 +369,16 @@ def _refine(cluster: Float, start: PlacedLadder, max_points: int) -> tuple[float
         towards = away / np.maximum(np.linalg.norm(away, axis=1), 1e-9)[:, None]
         turn, shift = np.cross(own - away, towards) @ placed.axes, towards @ placed.axes
         wider = 0.5 * towards[:, 0] * np.select([which == 0, which == 1], [-1.0, 1.0], 0.0)
-        return np.asarray(-np.column_stack([turn, shift, wider]) / NOISE)
+        thicker = 0.5 * (which < 2)
+        usual_stile = np.append(np.zeros(7), 1.0 / STILE_SIGMA)
+        return np.vstack([-np.column_stack([turn, shift, wider, thicker]) / NOISE, usual_stile])
 
-    found = least_squares(
-        residual, np.zeros(7), derivatives, loss="cauchy", x_scale=np.array([0.01] * 6 + [0.005]), max_nfev=max_points
-    )
+    scale = np.array([0.01] * 6 + [0.005, 0.005])
+    found = least_squares(residual, np.zeros(8), derivatives, loss="cauchy", x_scale=scale, max_nfev=max_points)
     information = found.jac.T @ found.jac
-    covariance = np.linalg.pinv(information, rcond=1e-12)
+    covariance = np.linalg.pinv(information, rcond=1e-12)[:7, :7]
     return (
         float(found.cost) / POINTS_PER_OBSERVATION,
-        start.moved(found.x[:3], found.x[3:6], float(found.x[6])),
+        start.moved(found.x[:3], found.x[3:6], float(found.x[6]), float(found.x[7])),
         np.asarray(covariance),
     )

@@ -376,7 +376,7 @@ def ladder_rows(
     ray = ray - (ray * axis).sum(axis=1)[:, None] * axis
     ray /= np.linalg.norm(ray, axis=1)[:, None]
     side = np.cross(axis, ray)
-    vector = away @ placed.axes + (ladder.diameter / 2.0 - depth) * ray
+    vector = away @ placed.axes + (placed.radius(which) - depth)[:, None] * ray
     along, across = (vector * ray).sum(axis=1), (vector * side).sum(axis=1)
     sigma_along = np.full(len(own), np.hypot(RANGE_NOISE, 0.005))
     sigma_across = np.hypot(BEAM_SIGMA * reach, 0.005)

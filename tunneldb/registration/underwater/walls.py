@@ -35,6 +35,8 @@ MAX_WALL_DISTANCE = 0.05  # m
 EDGE_BIN = 0.02  # m of height, for the lower edge of the walls
 COURSE_REACH, COURSE_COSINE = 4.0, 0.9  # m; of the normals of one wall
 CANAL_REACH = 8.0  # m in plan: longer than piers and recesses
+EDGE_REACH = 5  # bins below and above a height that are compared
+LEAST_STEP = 1.15  # ratio of points above and below it from which a height is the lower edge; at grazing rays most are mirrored
 USUAL_HEIGHTS = (0.1, 0.6)  # heights, m, between which walls have their usual point density
 
 
@@ -153,9 +155,10 @@ def find_walls(points: Float) -> Walls:
 
 
 def lower_edge(points: Float, walls: Walls) -> float:
-    """Return the height, m, down to which laser points (n, 3) show the walls, at half their usual density or more.
+    """Return the height, m, down to which laser points (n, 3) show the walls: where they become fewer, or end.
 
-    Only ``points`` are examined; mirror images of the walls in the water are fewer. 0 if there are too few, as on rock.
+    Only ``points`` are examined; mirror images of the walls in the water are fewer than the points of the walls. 0 if there are
+    too few, as on rock.
     """
     low = points[points[:, 2] < USUAL_HEIGHTS[1]]
     away, piece = walls.tree.query(low[:, :2], distance_upper_bound=2.0 * SPACING)
@@ -166,6 +169,12 @@ def lower_edge(points: Float, walls: Walls) -> float:
         return 0.0
     bins = np.arange(np.floor(height.min() / EDGE_BIN), USUAL_HEIGHTS[1] / EDGE_BIN + 0.5) * EDGE_BIN
     count, _ = np.histogram(height, bins)
+    sums = np.concatenate([[0.0], np.cumsum(count)])
+    at = np.arange(EDGE_REACH, len(count) - EDGE_REACH + 1)
+    above, below = sums[at + EDGE_REACH] - sums[at], sums[at] - sums[at - EDGE_REACH]
+    step = above / np.maximum(below, 1.0)
+    if len(step) and step.max() >= LEAST_STEP:
+        return float(bins[at[int(np.argmax(step))]])
     usual = float(np.median(count[bins[:-1] > USUAL_HEIGHTS[0]]))
     return float(bins[int(np.argmax(count > 0.5 * usual))])
 
