@@ -17,12 +17,14 @@ from scipy.special import log_ndtr
 
 from tunneldb.arrays import Float
 from tunneldb.registration.underwater.first_pose import LevelScan
+from tunneldb.robust import MAD_TO_SIGMA
 
 PIXEL = 0.1  # m
 REACH = 10.0  # m along, from the scanner
 MARGIN = 0.3  # m from the walls
 MAX_RELIEF_WIDTH = 2.5  # m: wider relief carries no information about the place
 MAX_HEIGHT_STEP = 0.6  # m: greater differences from the bed's height are objects and false echoes
+MAX_RELIEF_SIGMA = 4.0  # standard deviations to which relief counts: a few false echoes would outweigh the bed
 MIN_CELLS = 500  # that both scans must see
 MAX_SAME_BED_CORRELATION = 0.9  # greatest correlation of two scans of one bed, which they see from different sides
 MAX_CORRELATION_LENGTH = 30  # pixels within which relief may be correlated
@@ -82,8 +84,13 @@ def relief_of(scan: LevelScan) -> Relief | None:
         return None
     wide = _smooth(grid * seen) / np.maximum(_smooth(seen), 1e-6)
     fine = (grid - wide) * seen
-    usual = fine.sum(axis=0) / np.maximum(seen.sum(axis=0), 1.0)  # for example silt rising to the foot of the walls
+    known = np.where(seen > 0.0, fine, np.nan)
+    usual = np.zeros(shape[1])  # for example silt rising to the foot of the walls
+    there = seen.any(axis=0)
+    usual[there] = np.nanmedian(known[:, there], axis=0)
     fine = (fine - usual) * seen
+    bound = MAX_RELIEF_SIGMA * MAD_TO_SIGMA * float(np.median(np.abs(fine[seen > 0.0])))
+    fine = np.clip(fine, -bound, bound)
     return Relief(grid, fine, seen, _autocorrelation(fine, seen))
 
 
