@@ -157,8 +157,8 @@ def find_walls(points: Float) -> Walls:
 def lower_edge(points: Float, walls: Walls) -> float:
     """Return the height, m, down to which laser points (n, 3) show the walls: where they become fewer, or end.
 
-    Only ``points`` are examined; mirror images of the walls in the water are fewer than the points of the walls. 0 if there are
-    too few, as on rock.
+    Only ``points`` are examined; mirror images of the walls in the water are fewer than the points of the walls: at
+    grazing rays not by much. 0 if there are too few, as on rock.
     """
     low = points[points[:, 2] < USUAL_HEIGHTS[1]]
     away, piece = walls.tree.query(low[:, :2], distance_upper_bound=2.0 * SPACING)
@@ -169,14 +169,14 @@ def lower_edge(points: Float, walls: Walls) -> float:
         return 0.0
     bins = np.arange(np.floor(height.min() / EDGE_BIN), USUAL_HEIGHTS[1] / EDGE_BIN + 0.5) * EDGE_BIN
     count, _ = np.histogram(height, bins)
-    sums = np.concatenate([[0.0], np.cumsum(count)])
-    at = np.arange(EDGE_REACH, len(count) - EDGE_REACH + 1)
-    above, below = sums[at + EDGE_REACH] - sums[at], sums[at] - sums[at - EDGE_REACH]
-    step = above / np.maximum(below, 1.0)
-    if len(step) and step.max() >= LEAST_STEP:
-        return float(bins[at[int(np.argmax(step))]])
     usual = float(np.median(count[bins[:-1] > USUAL_HEIGHTS[0]]))
-    return float(bins[int(np.argmax(count > 0.5 * usual))])
+    lowest = int(np.argmax(count > 0.5 * usual))
+    sums = np.concatenate([[0.0], np.cumsum(count)])
+    at = np.arange(lowest + EDGE_REACH, len(count) - EDGE_REACH + 1)
+    step = (sums[at + EDGE_REACH] - sums[at]) / np.maximum(sums[at] - sums[at - EDGE_REACH], 1.0)
+    if bins[lowest] < -EDGE_REACH * EDGE_BIN and len(step) and step.max() >= LEAST_STEP:
+        return float(bins[at[int(np.argmax(step))]])
+    return float(bins[lowest])
 
 
 def _fit(near: Float, low: Float, tree: cKDTree, low_tree: cKDTree, centre: Float) -> list[float] | None:
