@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
@@ -36,6 +37,7 @@ EDGE_BIN = 0.02  # m of height, for the lower edge of the walls
 COURSE_REACH, COURSE_COSINE = 4.0, 0.9  # m; of the normals of one wall
 CANAL_REACH = 8.0  # m in plan: longer than piers and recesses
 EDGE_REACH = 5  # bins below and above a height that are compared
+STEP_SIGMA = 6.0  # of their difference, from which it is no accident
 LEAST_STEP = 1.15  # ratio of points above and below it from which a height is the lower edge; at grazing rays most are mirrored
 USUAL_HEIGHTS = (0.1, 0.6)  # heights, m, between which walls have their usual point density
 
@@ -171,12 +173,20 @@ def lower_edge(points: Float, walls: Walls) -> float:
     count, _ = np.histogram(height, bins)
     usual = float(np.median(count[bins[:-1] > USUAL_HEIGHTS[0]]))
     lowest = int(np.argmax(count > 0.5 * usual))
-    sums = np.concatenate([[0.0], np.cumsum(count)])
-    at = np.arange(lowest + EDGE_REACH, len(count) - EDGE_REACH + 1)
-    step = (sums[at + EDGE_REACH] - sums[at]) / np.maximum(sums[at] - sums[at - EDGE_REACH], 1.0)
-    if bins[lowest] < -EDGE_REACH * EDGE_BIN and len(step) and step.max() >= LEAST_STEP:
-        return float(bins[at[int(np.argmax(step))]])
-    return float(bins[lowest])
+    if bins[lowest] >= -EDGE_REACH * EDGE_BIN:
+        return float(bins[lowest])
+    steps = bins[lowest + EDGE_REACH :][_steps(count[lowest:])]
+    return float(steps[np.argmin(np.abs(steps))] if len(steps) else bins[lowest])
+
+
+def _steps(count: Int64) -> Int64:
+    """Return the bins, from EDGE_REACH on, from which there are more points than below; their numbers less EDGE_REACH."""
+    sums = np.concatenate([[0], np.cumsum(count)])
+    at = np.arange(EDGE_REACH, len(count) - EDGE_REACH + 1)
+    above, below = sums[at + EDGE_REACH] - sums[at], sums[at] - sums[at - EDGE_REACH]
+    ratio = above / np.maximum(below, 1)
+    clear = (ratio >= LEAST_STEP) & (above - below > STEP_SIGMA * np.sqrt(above + below))
+    return np.flatnonzero(clear & (ratio == maximum_filter1d(ratio, 2 * EDGE_REACH + 1)))
 
 
 def _fit(near: Float, low: Float, tree: cKDTree, low_tree: cKDTree, centre: Float) -> list[float] | None:
