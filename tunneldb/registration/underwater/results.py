@@ -33,7 +33,7 @@ class Ladder:
     stile_gap : float
         Distance between the axes of its two stiles, m.
     diameter : float
-        Diameter of rungs and stiles, m.
+        Diameter of the rungs, m; the stiles may be thicker.
     """
 
     name: str
