@@ -27,6 +27,7 @@ MAX_HEIGHT_STEP = 0.6  # m: greater differences from the bed's height are object
 MAX_RELIEF_SIGMA = 4.0  # standard deviations to which relief counts: a few false echoes would outweigh the bed
 MIN_CELLS = 500  # that both scans must see
 MAX_SAME_BED_CORRELATION = 0.9  # greatest correlation of two scans of one bed, which they see from different sides
+MIN_BED_SHARE = 0.02  # least share of the variance that is taken for bed
 MAX_CORRELATION_LENGTH = 30  # pixels within which relief may be correlated
 MIN_INDEPENDENT_PLACES = 3.0  # number of independent places up to which a correlation is meaningless
 MAX_CORRELATION = 0.99  # greatest correlation, to limit the evidence
@@ -126,16 +127,25 @@ def likelihood(one: Relief, other: Relief) -> Float:
     patch = max(float((_middle_of(one.likeness, other.likeness)).sum()), 1.0)  # pixels per independent place
     weight = np.sqrt(np.maximum(shared / patch - MIN_INDEPENDENT_PLACES, 0.0))
     valid = (shared > MIN_CELLS) & (weight > 0.0)
-    return np.where(valid, _log_ratio(np.arctanh(correlation) * weight, np.where(valid, weight, 1.0)), NO_EVIDENCE)
+    greatest = MAX_SAME_BED_CORRELATION * np.sqrt(_bed_share(one) * _bed_share(other))
+    score = np.arctanh(correlation) * weight
+    return np.where(valid, _log_ratio(score, np.where(valid, weight, 1.0), greatest), NO_EVIDENCE)
 
 
-def _log_ratio(score: Float, weight: Float) -> Float:
+def _bed_share(relief: Relief) -> float:
+    """Return the share of the relief's variance that is bed: what a cell has in common with those beside it, not noise."""
+    x, y = np.array(relief.likeness.shape) // 2
+    beside = relief.likeness[[x - 1, x + 1, x, x], [y, y, y - 1, y + 1]]
+    return max(float(beside.mean()), MIN_BED_SHARE)
+
+
+def _log_ratio(score: Float, weight: Float, greatest: float) -> Float:
     """Return the log likelihood ratio of scores (n,), with standard deviation 1, for one bed and for two.
 
-    The similarity of two scans of one bed is not known in advance: all correlations up to MAX_SAME_BED_CORRELATION are
-    equally likely, in Fisher's z.
+    The similarity of two scans of one bed is not known in advance: all correlations up to ``greatest`` are equally likely, in
+    Fisher's z.
     """
-    upper = np.arctanh(MAX_SAME_BED_CORRELATION) * weight
+    upper = np.arctanh(greatest) * weight
     high, low = log_ndtr(score), log_ndtr(score - upper)
     mean = high + np.log1p(-np.exp(np.minimum(low - high, -1e-12))) - np.log(upper)
     return np.asarray(mean + 0.5 * score**2 + 0.5 * np.log(2.0 * np.pi))
