@@ -11,6 +11,7 @@ CREATE TABLE IF NOT EXISTS tunnel_hub.server (
     state text NOT NULL DEFAULT 'present' CHECK (state IN ('present', 'different', 'away')),
     since timestamptz NOT NULL DEFAULT now(),
     message text,
+    shown boolean NOT NULL DEFAULT true,
     version text,
     imported_version text,
     tunnels bigint,
@@ -23,6 +24,8 @@ COMMENT ON COLUMN tunnel_hub.server.state IS
     'present; different: it answers, but lacks columns or views, or was upgraded; away: its tunnels are missing in all views';
 COMMENT ON COLUMN tunnel_hub.server.since IS 'Time since when it has this state';
 COMMENT ON COLUMN tunnel_hub.server.message IS 'Reason of the state; NULL if present';
+COMMENT ON COLUMN tunnel_hub.server.shown IS
+    'True if the views ask it; false if they warn instead. Differs from the state while open transactions keep the views from being changed';
 COMMENT ON COLUMN tunnel_hub.server.version IS 'Version of its schema tunnel_api at the last check that it answered';
 COMMENT ON COLUMN tunnel_hub.server.imported_version IS 'Version of its schema tunnel_api when its views were imported';
 COMMENT ON COLUMN tunnel_hub.server.tunnels IS 'Number of its tunnels at the last check that it answered';

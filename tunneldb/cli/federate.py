@@ -142,11 +142,13 @@ def check(ctx: click.Context, every: float | None) -> None:
     )
     for warning in checked.warnings:
         notify(f"Warning: {warning}")
-    ctx.exit(0 if all(member.state == "present" for member in checked.members) else 1)
+    ctx.exit(0 if all(member.state == "present" and member.shown for member in checked.members) else 1)
 
 
 def _notify_changes(checked: Checked, before: Mapping[str, str]) -> None:
     """Print the servers whose state is another one than before; at first those that are not present."""
+    for warning in checked.warnings if before else ():
+        notify(f"Warning: {warning}")
     for member in checked.members:
         if member.state != before.get(member.name, "present"):
             notify(f"{member.name} is {member.state}" + (f": {member.message}" if member.message else ""))
@@ -157,8 +159,9 @@ def _notify_changes(checked: Checked, before: Mapping[str, str]) -> None:
 def _record(member: Member) -> dict[str, Any]:
     """Return a server as an object for programs."""
     return {
-        "name": member.name, "state": member.state, "since": member.since, "checked_at": member.checked_at,
-        "message": member.message, "version": member.version, "tunnels": member.tunnels, "surveys": member.surveys,
+        "name": member.name, "state": member.state, "since": member.since, "shown": member.shown,
+        "checked_at": member.checked_at, "message": member.message, "version": member.version,
+        "tunnels": member.tunnels, "surveys": member.surveys,
         "host": _host(member.options), "port": member.options.get("port"), "database": member.options.get("dbname"),
         "user": member.user,
     }  # fmt: skip

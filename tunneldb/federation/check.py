@@ -7,13 +7,13 @@ from typing import Any
 
 import psycopg
 
-from tunneldb.errors import UserError
+from tunneldb.errors import BusyError
 from tunneldb.federation.advice import describe_gaps, warnings_of
-from tunneldb.federation.hub import begin_change
+from tunneldb.federation.hub import changing
 from tunneldb.federation.load import Member, load_members, load_tables
-from tunneldb.federation.save import save_views
+from tunneldb.federation.save import show_servers
 from tunneldb.federation.servers import ask_server, reason
-from tunneldb.federation.views import find_gaps, plan_views
+from tunneldb.federation.views import find_gaps
 
 _SAVE = """
 UPDATE tunnel_hub.server s
@@ -22,6 +22,10 @@ UPDATE tunnel_hub.server s
        surveys = coalesce(%(surveys)s, s.surveys), checked_at = now()
  WHERE s.name = %(name)s
 """
+
+
+VIEWS_TIMEOUT = "3s"
+"""Time for which a check waits for queries that use the views; the next check tries again."""
 
 
 @dataclass(frozen=True)
@@ -55,31 +59,31 @@ def check_servers(connection: psycopg.Connection[Any]) -> Checked:
     Raises
     ------
     UserError
-        If this role may not change the hub, or queries use its views for too long.
+        If this role may not change the hub.
     """
-    try:
-        with connection.transaction():
-            begin_change(connection)
-            return _check(connection)
-    except psycopg.errors.InsufficientPrivilege as error:
-        raise UserError(f"{connection.info.user} may not change the hub: {error.diag.message_primary}") from None
-    except psycopg.errors.LockNotAvailable as error:
-        raise UserError(f"queries use the views of the hub, its state was not noted: {error.diag.message_primary}") from None
-
-
-def _check(connection: psycopg.Connection[Any]) -> Checked:
-    before = load_members(connection)
-    servers = {member.name: load_tables(connection, member.name) for member in before}
-    gaps = find_gaps(servers)
     warnings: list[str] = []
-    for member in before:
-        connection.execute(_SAVE, _ask(connection, member, gaps[member.name], warnings))
-    after = load_members(connection)
-    went = [new.name for old, new in zip(before, after, strict=True) if new.away and not old.away]
-    returned = [new.name for old, new in zip(before, after, strict=True) if old.away and not new.away]
+    with changing(connection):
+        noted = _note(connection, warnings)
+    went = [member.name for member in noted if member.away and member.shown]
+    returned = [member.name for member in noted if not member.away and not member.shown]
     if went or returned:
-        save_views(connection, plan_views(servers, [member.name for member in after if member.away]))
-    return Checked(after, went, returned, warnings)
+        try:
+            with changing(connection, VIEWS_TIMEOUT):
+                show_servers(connection)
+        except BusyError as error:
+            warnings.append(f"{error}: the views show {', '.join(went + returned)} as before until the next check")
+            went, returned = [], []
+    with connection.transaction():
+        return Checked(load_members(connection), went, returned, warnings)
+
+
+def _note(connection: psycopg.Connection[Any], warnings: list[str]) -> list[Member]:
+    """Ask each server, note its state, and return the servers as they are now."""
+    members = load_members(connection)
+    gaps = find_gaps({member.name: load_tables(connection, member.name) for member in members})
+    for member in members:
+        connection.execute(_SAVE, _ask(connection, member, gaps[member.name], warnings))
+    return load_members(connection)
 
 
 def _ask(connection: psycopg.Connection[Any], member: Member, gaps: list[str], warnings: list[str]) -> dict[str, Any]:

@@ -2,27 +2,51 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import psycopg
 from psycopg import sql
 
 from tunneldb.database.failures import first_line
+from tunneldb.database.locks import open_transactions
 from tunneldb.database.resources import resource_dir
-from tunneldb.errors import UserError
+from tunneldb.errors import BusyError, UserError
 from tunneldb.federation.names import HUB, INTERNAL
 
 _LOCK = 7088630453  # arbitrary number; commands that change the hub wait for each other
-_LOCK_TIMEOUT = "30s"  # time to wait for queries that use the views
+LOCK_TIMEOUT = "10s"
+"""Time to wait for queries that use the views. Later queries wait behind it."""
 
 _SETTINGS = ("enable_partitionwise_join", "enable_partitionwise_aggregate")
 """Settings by which the planner sends joins and aggregates of each server to it; off by default."""
 
 
-def begin_change(connection: psycopg.Connection[Any]) -> None:
-    """Wait for other commands that change the hub; within the transaction of the caller."""
-    connection.execute(sql.SQL("SET LOCAL lock_timeout = {}").format(_LOCK_TIMEOUT))
-    connection.execute("SELECT pg_advisory_xact_lock(%s)", [_LOCK])
+@contextmanager
+def changing(connection: psycopg.Connection[Any], lock_timeout: str = LOCK_TIMEOUT) -> Iterator[None]:
+    """Change the hub in one transaction within a with block; other commands that change it wait.
+
+    Raises
+    ------
+    BusyError
+        If queries use the views for longer than the lock timeout. Nothing is changed.
+    UserError
+        If this role may not change the hub.
+    """
+    try:
+        with connection.transaction():
+            connection.execute("SELECT pg_advisory_xact_lock(%s)", [_LOCK])
+            connection.execute(sql.SQL("SET LOCAL lock_timeout = {}").format(lock_timeout))
+            yield
+    except psycopg.errors.LockNotAvailable:
+        holders = open_transactions(connection)
+        connection.rollback()
+        raise BusyError(f"the views of the hub are in use{': ' if holders else ''}{holders}; nothing was changed") from None
+    except psycopg.errors.InsufficientPrivilege as error:
+        raise UserError(
+            f"{connection.info.user} may not change the hub ({first_line(error)}): use the role that made it"
+        ) from None
 
 
 def prepare_hub(connection: psycopg.Connection[Any]) -> None:
@@ -46,14 +70,7 @@ def prepare_hub(connection: psycopg.Connection[Any]) -> None:
                 f"{extension} is not installed on the hub's machine ({first_line(error)}): on Debian, PostGIS is in"
                 " postgresql-15-postgis-3, and postgres_fdw comes with postgresql-15"
             ) from None
-    try:
-        with connection.transaction():
-            connection.execute((resource_dir("sql") / "hub" / "hub.sql").read_bytes())
-    except psycopg.errors.InsufficientPrivilege as error:
-        raise UserError(
-            f"{connection.info.user} may not change the hub ({first_line(error)}): use the role that made it, or the owner"
-            f" of database {connection.info.dbname}"
-        ) from None
+    connection.execute((resource_dir("sql") / "hub" / "hub.sql").read_bytes())
 
 
 def set_planner(connection: psycopg.Connection[Any], *, on: bool) -> str | None:

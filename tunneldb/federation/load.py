@@ -14,7 +14,7 @@ from tunneldb.federation.names import COMMENTS, HUB, INTERNAL, STATE, foreign_se
 from tunneldb.federation.views import Column, Tables
 
 _MEMBERS = """
-SELECT h.name, h.state, h.since, h.message, h.version, h.imported_version, h.tunnels, h.surveys, h.checked_at,
+SELECT h.name, h.state, h.since, h.message, h.shown, h.version, h.imported_version, h.tunnels, h.surveys, h.checked_at,
        coalesce((SELECT jsonb_object_agg(o.option_name, o.option_value) FROM pg_options_to_table(s.srvoptions) o), '{}'),
        (SELECT o.option_value FROM pg_user_mappings m, pg_options_to_table(m.umoptions) o
          WHERE m.srvid = s.oid AND m.umuser = s.srvowner AND o.option_name = 'user')
@@ -53,6 +53,8 @@ class Member:
         Begin of the state; time of the last check.
     message
         Reason of the state, None if present.
+    shown
+        True if the views ask it, False if they warn instead.
     version, imported_version
         Version of its schema tunnel_api, now and when its views were imported.
     tunnels, surveys
@@ -65,6 +67,7 @@ class Member:
     state: str
     since: dt.datetime
     message: str | None
+    shown: bool
     version: str | None
     imported_version: str | None
     tunnels: int | None

@@ -7,15 +7,14 @@ from typing import Any
 
 import psycopg
 
-from tunneldb.errors import UserError
 from tunneldb.federation.advice import describe_gaps, warnings_of
-from tunneldb.federation.hub import begin_change, drop_hub, prepare_hub, set_planner
+from tunneldb.federation.hub import changing, drop_hub, prepare_hub, set_planner
 from tunneldb.federation.load import find_member, load_members, load_tables
 from tunneldb.federation.names import check_name, foreign_server
-from tunneldb.federation.save import save_views
+from tunneldb.federation.save import show_servers
 from tunneldb.federation.servers import DatabaseState, drop_server, drop_tables, import_tables, save_server
 from tunneldb.federation.target import parse_target
-from tunneldb.federation.views import find_gaps, plan_views
+from tunneldb.federation.views import find_gaps
 
 _SAVE = """
 INSERT INTO tunnel_hub.server AS s (name, state, message, version, imported_version, tunnels, surveys)
@@ -65,8 +64,7 @@ def add_server(connection: psycopg.Connection[Any], name: str, dsn: str | None) 
     """
     check_name(name)
     target = None if dsn is None else parse_target(name, dsn)
-    with connection.transaction():
-        begin_change(connection)
+    with changing(connection):
         if target is None:
             find_member(load_members(connection), name)
         prepare_hub(connection)
@@ -78,8 +76,7 @@ def add_server(connection: psycopg.Connection[Any], name: str, dsn: str | None) 
         gaps = find_gaps(servers)[name]
         if gaps:
             _save_state(connection, name, state, describe_gaps(gaps))
-        views = plan_views(servers, [member.name for member in load_members(connection) if member.away])
-        save_views(connection, views)
+        views = show_servers(connection)
         drop_tables(connection, name, old=True)
         connection.execute("SELECT tunnel_hub_internal.copy_comments(%s)", [foreign_server(name)])
         statement = set_planner(connection, on=True)
@@ -88,7 +85,7 @@ def add_server(connection: psycopg.Connection[Any], name: str, dsn: str | None) 
         warnings.insert(0, f"{name} {describe_gaps(gaps)}")
     if statement:
         warnings.append(f"joins and aggregates are not sent to the servers until the owner of the database runs: {statement}")
-    return Added(state, len(views), warnings)
+    return Added(state, views, warnings)
 
 
 def _save_state(connection: psycopg.Connection[Any], name: str, state: DatabaseState, gaps: str | None) -> None:
@@ -109,22 +106,17 @@ def remove_server(connection: psycopg.Connection[Any], name: str) -> int:
     Raises
     ------
     UserError
-        If the hub has no such server, or objects of users depend on its tables.
+        If the hub has no such server, its views are in use, or objects of users depend on its tables.
     """
-    with connection.transaction():
-        begin_change(connection)
+    with changing(connection):
         members = load_members(connection)
         find_member(members, name)
-        try:
-            connection.execute("DELETE FROM tunnel_hub.server WHERE name = %s", [name])
-            others = [member for member in members if member.name != name]
-            servers = {member.name: load_tables(connection, member.name) for member in others}
-            save_views(connection, plan_views(servers, [member.name for member in others if member.away]))
-            drop_tables(connection, name)
-            drop_server(connection, name)
-            if not others:
-                drop_hub(connection)
-                set_planner(connection, on=False)
-        except psycopg.errors.InsufficientPrivilege as error:
-            raise UserError(f"{connection.info.user} may not change the hub: {error.diag.message_primary}") from None
+        connection.execute("DELETE FROM tunnel_hub.server WHERE name = %s", [name])
+        others = [member for member in members if member.name != name]
+        show_servers(connection)
+        drop_tables(connection, name)
+        drop_server(connection, name)
+        if not others:
+            drop_hub(connection)
+            set_planner(connection, on=False)
     return len(others)

@@ -10,9 +10,21 @@ from psycopg import sql
 from tunneldb.database.failures import first_line
 from tunneldb.database.resources import resource_dir
 from tunneldb.errors import UserError
-from tunneldb.federation.load import Present, load_present
+from tunneldb.federation.load import Present, load_members, load_present, load_tables
 from tunneldb.federation.names import HUB, INTERNAL, SERVER, foreign_server
-from tunneldb.federation.views import Column, HubView
+from tunneldb.federation.views import Column, HubView, plan_views
+
+
+def show_servers(connection: psycopg.Connection[Any]) -> int:
+    """Make the views over all servers of the hub by their states, within the transaction of the caller; return their number."""
+    members = load_members(connection)
+    views = plan_views(
+        {member.name: load_tables(connection, member.name) for member in members},
+        [member.name for member in members if member.away],
+    )
+    save_views(connection, views)
+    connection.execute("UPDATE tunnel_hub.server SET shown = state <> 'away' WHERE shown = (state = 'away')")
+    return len(views)
 
 
 def save_views(connection: psycopg.Connection[Any], views: list[HubView]) -> None:

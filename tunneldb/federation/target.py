@@ -27,9 +27,10 @@ PLANNING = {
     "async_capable": "true",
     "extensions": "postgis",
     "fetch_size": "1000",
-    "use_remote_estimate": "true",
+    "use_remote_estimate": "false",
 }
-"""Options of postgres_fdw: read only, all servers at once, functions of PostGIS are sent, estimates are the server's own."""
+"""Options of postgres_fdw: read only, all servers at once, functions of PostGIS are sent. Estimates of the servers take longer
+than most queries."""
 
 
 @dataclass(frozen=True)
