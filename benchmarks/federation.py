@@ -2,7 +2,7 @@
 
     python -m benchmarks.federation                        # starts five embedded servers, fills four, asks, removes them
     python -m benchmarks.federation --keep FOLDER          # keeps them there, and asks again without filling
-    python -m benchmarks.federation --estimates false      # without estimates of the servers
+    python -m benchmarks.federation --option use_remote_estimate=true      # with estimates of the servers
 
 All servers run on this machine, without delay between them. Each question is asked in a session of its own: first cold (plans,
 connections to the servers), then warm, the median of five. The questions are those of docs/cookbook.md that make sense over
@@ -27,16 +27,18 @@ from typing import Any
 
 import psycopg
 from psycopg import sql
+from psycopg.conninfo import make_conninfo
 
 from benchmarks.common import print_table, progress, save, tunneldb
 from benchmarks.questions import PAGE, questions
 from benchmarks.synthetic import Size, make
 from tunneldb.database.server import Server
+from tunneldb.federation.target import PLANNING as OPTIONS
 
 SERVERS = {"north": "abcd", "south": "efg", "west": "hij"}
 """Tunnels of each server; each has three surveys."""
 
-SETTINGS = {"shared_buffers": "256MB", "fsync": "off"}
+SETTINGS = {"shared_buffers": "256MB", "fsync": "off", "max_wal_size": "256MB"}
 WARM = 5
 
 HUB_QUESTIONS = {
@@ -263,19 +265,22 @@ def prepare(folder: Path, size: Size) -> tuple[str, str]:
             progress(name)
             fill(dsns[name], tunnels, size)
     for name in SERVERS:
-        target = psycopg.conninfo.make_conninfo(dsns[name], user="hub_reader")
+        target = make_conninfo(dsns[name], user="hub_reader")
         seconds = tunneldb("federate", "add", name, "--dsn", target, dsn=dsns["hub"])
         progress(f"federate add {name}: {seconds:.1f} s")
     return dsns["one"], dsns["hub"]
 
 
-def set_options(hub: str, **options: str) -> None:
+def set_options(hub: str, options: dict[str, str]) -> None:
     with psycopg.connect(hub, autocommit=True) as connection:
         for name in SERVERS:
             for key, value in options.items():
                 connection.execute(
-                    sql.SQL("ALTER SERVER {} OPTIONS (SET {} {})").format(
-                        sql.Identifier(f"tunnel_server_{name}"), sql.Identifier(key), sql.Literal(value)
+                    sql.SQL("ALTER SERVER {} OPTIONS ({} {} {})").format(
+                        sql.Identifier(f"tunnel_server_{name}"),
+                        sql.SQL("SET" if key in OPTIONS else "ADD"),
+                        sql.Identifier(key),
+                        sql.Literal(value),
                     )
                 )
 
@@ -305,16 +310,17 @@ def main() -> None:
     parser.add_argument("--km", type=int, default=25, help="kilometres of each tunnel")
     parser.add_argument("--leaks", type=int, default=5000, help="leaks of each tunnel")
     parser.add_argument("--only", default="", metavar="WORD", help="questions whose heading holds it")
-    parser.add_argument("--estimates", choices=("true", "false"), help="use_remote_estimate; default: as federate add sets it")
+    parser.add_argument("--option", action="append", default=[], metavar="NAME=VALUE", help="option of the foreign servers")
+    parser.add_argument("--setting", action="append", default=[], metavar="NAME=VALUE", help="setting of the hub's planner")
     arguments = parser.parse_args()
     size = Size(arguments.km, arguments.leaks, 0, arguments.leaks // 10, arguments.leaks // 5)
     folder = arguments.keep or Path(tempfile.mkdtemp(prefix="tunneldb-federation-"))
     load = os.getloadavg()[0]
     try:
         one, hub = prepare(folder, size)
-        if arguments.estimates:
-            set_options(hub, use_remote_estimate=arguments.estimates)
-        found = measure(one, hub, arguments.only)
+        set_options(hub, dict(option.split("=", 1) for option in arguments.option))
+        planned = make_conninfo(hub, options=" ".join(f"-c {setting}" for setting in arguments.setting))
+        found = measure(one, planned, arguments.only)
         report(found)
     finally:
         for name in ("one", "hub", *SERVERS):

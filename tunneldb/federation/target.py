@@ -18,7 +18,7 @@ _OF_THE_WRAPPER = ("client_encoding", "fallback_application_name")
 """Parameters of libpq that postgres_fdw sets itself."""
 
 DEFAULTS = {"connect_timeout": "3", "keepalives_idle": "10", "keepalives_interval": "5", "keepalives_count": "3",
-            "tcp_user_timeout": "25000", "application_name": "tunneldb hub"}  # fmt: skip
+            "tcp_user_timeout": "25000", "application_name": "tunneldb: hub"}  # fmt: skip
 """Parameters of libpq unless the connection string states others: a lost server is noticed within 25 s."""
 
 PLANNING = {
