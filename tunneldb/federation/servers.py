@@ -20,6 +20,9 @@ PROBE_TIMEOUT = "10s"
 _LARGE_ROWS = "10"
 """Rows of views with bytea columns, such as pictures, that are fetched at once."""
 
+_ESTIMATED = ("deviation_section", "evenness_area", "evenness_section", "thickness_section")
+"""Views with a row for each metre or less whose rows the servers estimate quickly, so that they are sorted there."""
+
 
 @dataclass(frozen=True)
 class DatabaseState:
@@ -147,22 +150,24 @@ def import_tables(connection: psycopg.Connection[Any], name: str) -> DatabaseSta
         raise UserError(f"cannot use {name}: {reason(error)}") from None
     if state.server != name:
         raise UserError(f"{name} does not take the option tunneldb.server: connect to PostgreSQL itself, not to a pooler")
-    _fetch_less(connection, name)
+    _set_options(connection, name)
     return state
 
 
-def _fetch_less(connection: psycopg.Connection[Any], name: str) -> None:
+def _set_options(connection: psycopg.Connection[Any], name: str) -> None:
+    """Set options of the foreign tables that need others than their server."""
     rows = connection.execute(
-        "SELECT DISTINCT c.relname FROM pg_class c JOIN pg_attribute a ON a.attrelid = c.oid"
-        " WHERE c.relnamespace = to_regnamespace(%s) AND c.relkind = 'f' AND a.atttypid = 'bytea'::regtype",
+        "SELECT c.relname, bool_or(a.atttypid = 'bytea'::regtype) FROM pg_class c JOIN pg_attribute a ON a.attrelid = c.oid"
+        " WHERE c.relnamespace = to_regnamespace(%s) AND c.relkind = 'f' GROUP BY c.relname",
         [foreign_server(name)],
     ).fetchall()
-    for (table,) in rows:
-        connection.execute(
-            sql.SQL("ALTER FOREIGN TABLE {} OPTIONS (ADD fetch_size {})").format(
-                sql.Identifier(foreign_server(name), table), sql.Literal(_LARGE_ROWS)
-            )
-        )
+    for table, large in rows:
+        options = {"fetch_size": _LARGE_ROWS} if large else {}
+        if table in _ESTIMATED:
+            options["use_remote_estimate"] = "true"
+        if changes := _changes({}, options):
+            identifier = sql.Identifier(foreign_server(name), table)
+            connection.execute(sql.SQL("ALTER FOREIGN TABLE {} OPTIONS ({})").format(identifier, changes))
 
 
 def ask_server(connection: psycopg.Connection[Any], name: str) -> DatabaseState:

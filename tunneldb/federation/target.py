@@ -28,9 +28,10 @@ PLANNING = {
     "extensions": "postgis",
     "fetch_size": "1000",
     "use_remote_estimate": "false",
+    "fdw_tuple_cost": "1",
 }
 """Options of postgres_fdw: read only, all servers at once, functions of PostGIS are sent. Estimates of the servers take longer
-than most queries."""
+than most queries. Without them the planner expects few rows; a high cost of each makes it group and join on the servers."""
 
 
 @dataclass(frozen=True)
