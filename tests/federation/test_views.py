@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
+from pathlib import Path
 
 import psycopg
 import pytest
@@ -112,7 +114,7 @@ def test_joins_and_aggregates_by_server_are_sent(viewer: psycopg.Connection) -> 
         plan(
             viewer,
             "SELECT l.id, s.label_from FROM tunnel_hub.leak l JOIN tunnel_hub.segment s"
-            " ON s.server = l.server AND s.survey_id = l.survey_id AND s.n = l.segment",
+            " ON s.server = l.server AND s.survey_id = l.survey_id AND s.n = l.segment WHERE l.survey = 'demo-2024' AND l.area > 1",
         )
     )
     assert len(joined) == 2
@@ -150,3 +152,13 @@ def test_the_servers_cannot_be_written_by_the_hub_either(shared_federation: Fede
         pytest.raises(psycopg.errors.ObjectNotInPrerequisiteState),
     ):
         owner.execute("UPDATE tunnel_server_north.leak SET review = 'confirmed'")
+
+
+PAGE = Path(__file__).parents[2] / "docs" / "howto-federate.md"
+
+
+def test_the_queries_of_the_documentation_run(viewer: psycopg.Connection) -> None:
+    queries = re.findall(r"^```psql\n(SELECT.*?)^```$", PAGE.read_text("utf-8"), re.MULTILINE | re.DOTALL)
+    assert len(queries) == 2
+    for query in queries:
+        assert {row[0] for row in viewer.execute(query.encode())} == {"north", "south"}
