@@ -114,7 +114,8 @@ def test_joins_and_aggregates_by_server_are_sent(viewer: psycopg.Connection) -> 
         plan(
             viewer,
             "SELECT l.id, s.label_from FROM tunnel_hub.leak l JOIN tunnel_hub.segment s"
-            " ON s.server = l.server AND s.survey_id = l.survey_id AND s.n = l.segment WHERE l.survey = 'demo-2024' AND l.area > 1",
+            " ON s.server = l.server AND s.survey_id = l.survey_id AND s.n = l.segment"
+            " WHERE l.survey = 'demo-2024' AND l.area > 1",
         )
     )
     assert len(joined) == 2
