@@ -113,6 +113,7 @@ def check(ctx: click.Context, every: float | None) -> None:
     servers, and warn that its tunnels are missing. The next check that it answers puts it in again. Until a check finds that a
     server is away, queries that need it fail.
     """
+    from tunneldb.database.failures import describe_failure
     from tunneldb.federation import check_servers
 
     settings: Settings = ctx.obj
@@ -124,8 +125,11 @@ def check(ctx: click.Context, every: float | None) -> None:
                 checked = check_servers(connection)
             _notify_changes(checked, before)
             before = {member.name: member.state for member in checked.members}
-        except UserError as error:  # of the hub, which may be away itself
-            notify(f"Warning: {error}")
+        except Exception as error:  # of the hub, which may be away itself
+            message = str(error) if isinstance(error, UserError) else describe_failure(error)
+            if message is None:
+                raise
+            notify(f"Warning: {message}")
         time.sleep(max(0.0, every - (time.monotonic() - begin)))
     with open_connection(settings.dsn) as connection:
         checked = check_servers(connection)

@@ -73,16 +73,15 @@ def add_server(connection: psycopg.Connection[Any], name: str, dsn: str | None) 
         state = import_tables(connection, name)
         _save_state(connection, name, state, None)
         servers = {member.name: load_tables(connection, member.name) for member in load_members(connection)}
-        gaps = find_gaps(servers)[name]
-        if gaps:
-            _save_state(connection, name, state, describe_gaps(gaps))
+        gaps = find_gaps(servers)
+        if gaps[name]:
+            _save_state(connection, name, state, describe_gaps(gaps[name]))
         views = show_servers(connection)
         drop_tables(connection, name, old=True)
         connection.execute("SELECT tunnel_hub_internal.copy_comments(%s)", [foreign_server(name)])
         statement = set_planner(connection, on=True)
-        warnings = warnings_of(connection, name, state)
-    if gaps:
-        warnings.insert(0, f"{name} {describe_gaps(gaps)}")
+        warnings = [f"{server} {describe_gaps(missing)}" for server, missing in gaps.items() if missing]
+        warnings += warnings_of(connection, name, state)
     if statement:
         warnings.append(f"joins and aggregates are not sent to the servers until the owner of the database runs: {statement}")
     return Added(state, views, warnings)

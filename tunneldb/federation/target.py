@@ -61,7 +61,7 @@ def parse_target(name: str, dsn: str) -> Target:
     try:
         given = {key: str(value) for key, value in conninfo_to_dict(dsn).items() if value is not None}
     except psycopg.ProgrammingError as error:
-        raise UserError(f"the DSN of {name} is not valid for libpq: {_without(first_line(error), dsn)}") from None
+        raise UserError(f"the DSN of {name} is not valid for libpq: {_reason(first_line(error))}") from None
     if secret := next((key for key in SECRETS if key in given), None):
         raise UserError(
             f"the DSN of {name} has a {secret}, which is not stored: use a password file of the operating-system user of the"
@@ -70,13 +70,13 @@ def parse_target(name: str, dsn: str) -> Target:
     user = given.pop("user", None)
     if not user:
         raise UserError(f"the DSN of {name} names no user: add user=…, a login with the role tunnel_viewer there")
-    if not given.get("dbname"):
+    if not given.get("dbname") and "service" not in given:
         raise UserError(f"the DSN of {name} names no database: add dbname=…")
     options = DEFAULTS | {key: value for key, value in given.items() if key not in _OF_THE_WRAPPER} | PLANNING
     options["options"] = f"{given.get('options', '')} -c tunneldb.server={name}".strip()
     return Target(options, user)
 
 
-def _without(message: str, dsn: str) -> str:
-    """Return libpq's message without the parts of the string that it quotes, which may be a password."""
-    return message.split('"', 1)[0].strip().rstrip(":") if '"' in message or dsn in message else message
+def _reason(message: str) -> str:
+    """Return libpq's message without the part of the string that it quotes, which may be a password."""
+    return 'a word without "="' if message.startswith('missing "="') else message.split('"', 1)[0].rstrip(" :")
