@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import getpass
+import os
 import shutil
 import signal
 import subprocess
@@ -12,14 +14,17 @@ from pathlib import Path
 
 import psycopg
 import pytest
+from psycopg import sql
 from psycopg.conninfo import make_conninfo
 from support.federation import READER, Federation, reader
 
 from tunneldb.database import install, open_connection
+from tunneldb.database.binaries import find_binaries
 from tunneldb.database.server import Server
 from tunneldb.stages.registry import REGISTRY
 
 TUNNELDB = [sys.executable, "-c", "from tunneldb.cli.main import main; main()"]
+SECRET = "Geheim-4711"
 COUNT = "SELECT server, count(*) FROM tunnel_hub.tunnel GROUP BY server ORDER BY server"
 
 
@@ -41,6 +46,32 @@ def west() -> Iterator[tuple[Server, str]]:
     finally:
         server.stop()
         shutil.rmtree(home)
+
+
+def test_a_password_comes_from_a_file_of_the_hub(federation: Federation, west: tuple[Server, str], server_dsn: str) -> None:
+    server, dsn = west
+    home = server.home()
+    rules, passwords = home.state / "rules.conf", Path(server_dsn.partition("host=")[2].split()[0]) / "passwords"
+    rules.write_text(f"local all {READER} scram-sha-256\nlocal all all trust\n")
+    with psycopg.connect(make_conninfo(dsn, user=getpass.getuser()), autocommit=True) as owner:
+        owner.execute(f"ALTER ROLE {READER} PASSWORD '{SECRET}'".encode())
+        owner.execute(sql.SQL("ALTER SYSTEM SET hba_file = {}").format(sql.Literal(str(rules))))
+    for path in (rules, passwords):
+        path.touch(0o600)
+        if home.user is not None:
+            os.chown(path, home.user.pw_uid, home.user.pw_gid)
+    server.stop()
+    server.start()
+    target = make_conninfo(dsn, passfile=str(passwords))
+    assert "no password supplied" in federation.federate("add", "west", "--dsn", target, code=2)
+    passwords.write_text(f"*:*:*:{READER}:{SECRET}\n")
+    federation.federate("add", "west", "--dsn", target)
+    assert "present" in federation.federate("check")
+    assert ask(federation.hub, "SELECT server, name FROM tunnel_hub.tunnel") == ([("west", "west")], [])
+    dump = subprocess.run([find_binaries()["pg_dump"], "--dbname", federation.hub], capture_output=True, text=True, check=True)
+    assert str(passwords) in dump.stdout
+    assert SECRET not in dump.stdout
+    assert SECRET not in Server().home().log.read_text()
 
 
 def ask(dsn: str, query: str) -> tuple[list[tuple[object, ...]], list[str]]:
