@@ -109,6 +109,8 @@ def test_others_answer_while_a_server_is_away(federation: Federation, west: tupl
     assert ask(federation.hub, "SELECT name FROM tunnel_hub.tunnel WHERE server = 'north'") == ([("demo",)], [])
     rows, warnings = ask(federation.hub, "SELECT name FROM tunnel_hub.tunnel WHERE server = 'west'")
     assert (rows, len(warnings)) == ([], 1)
+    for query in ("SELECT name FROM tunnel_hub.tunnel LIMIT 1", "SELECT EXISTS (SELECT FROM tunnel_hub.tunnel)"):
+        assert len(ask(federation.hub, query)[1]) == 1
     ((state, message, tunnels),), _ = ask(
         federation.hub, "SELECT state, message, tunnels FROM tunnel_hub.server WHERE name = 'west'"
     )

@@ -100,19 +100,22 @@ def _define(name: str, branches: list[sql.Composed]) -> sql.Composed:
 
 
 def _branches(view: HubView) -> list[sql.Composed]:
-    """Return the parts of a view: the table of complete servers, incomplete servers, and warnings of those that are away."""
+    """Return the parts of a view: warnings of servers that are away, the table of complete servers, incomplete servers.
+
+    The warnings come first, so that a query with LIMIT, which may not need the later parts, gets them, too.
+    """
     columns = sql.SQL(", ").join(sql.Identifier(column.name) for column in view.columns)
     branches = []
+    for server in view.away:
+        constants = sql.SQL(", ").join(_value(column, server) for column in view.columns)
+        warning = sql.SQL("{}({})").format(sql.Identifier(INTERNAL, "warn_away"), sql.Literal(server))
+        branches.append(sql.SQL("SELECT {} WHERE {}").format(constants, warning))
     if view.partitions or not (view.incomplete or view.away):
         branches.append(sql.SQL("SELECT {} FROM {}").format(columns, sql.Identifier(INTERNAL, view.name)))
     for server, known in view.incomplete.items():
         values = [sql.Identifier(c.name) if c.name in known and c.name != SERVER else _value(c, server) for c in view.columns]
         source = sql.Identifier(foreign_server(server), view.name)
         branches.append(sql.SQL("SELECT {} FROM {}").format(sql.SQL(", ").join(values), source))
-    for server in view.away:
-        values = [_value(column, server) for column in view.columns]
-        warning = sql.SQL("{}({})").format(sql.Identifier(INTERNAL, "warn_away"), sql.Literal(server))
-        branches.append(sql.SQL("SELECT {} WHERE {}").format(sql.SQL(", ").join(values), warning))
     return branches
 
 
