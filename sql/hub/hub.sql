@@ -51,6 +51,16 @@ END
 $$;
 COMMENT ON FUNCTION tunnel_hub_internal.warn_away(text) IS 'Warn that the tunnels of a server are missing in the answer; returns false';
 
+-- A branch of a view that a server of another version lacks.
+CREATE OR REPLACE FUNCTION tunnel_hub_internal.warn_lacking(server text, view text) RETURNS boolean
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_temp AS $$
+BEGIN
+    RAISE WARNING 'server % has no view %: its rows are missing here', server, view USING ERRCODE = 'undefined_table';
+    RETURN false;
+END
+$$;
+COMMENT ON FUNCTION tunnel_hub_internal.warn_lacking(text, text) IS 'Warn that a server of another version has no such view; returns false';
+
 -- Comments of the views of a server for those of the hub.
 CREATE OR REPLACE FUNCTION tunnel_hub_internal.copy_comments(server_schema text) RETURNS void
 LANGUAGE plpgsql VOLATILE STRICT SET search_path = pg_catalog, pg_temp AS $$

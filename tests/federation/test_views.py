@@ -26,7 +26,7 @@ def test_a_column_that_one_server_lacks_is_null_there() -> None:
     leak, ring = plan_views(servers)
     assert leak.columns == (SERVER, AREA, WIDTH)
     assert (leak.partitions, leak.incomplete) == (("south",), {"north": {"server", "area"}})
-    assert ring.partitions == ("south",)
+    assert (ring.partitions, ring.lacking) == (("south",), ("north",))
     assert find_gaps(servers) == {"north": ["leak.width", "ring"], "south": []}
 
 

@@ -14,9 +14,9 @@ _SHOWN = 5
 
 
 def describe_gaps(gaps: Sequence[str]) -> str:
-    """Return what a server lacks, as ``lacks leak.area, which is NULL``."""
+    """Return what a server lacks, and the consequence."""
     more = f" and {len(gaps) - _SHOWN} more" if len(gaps) > _SHOWN else ""
-    return f"lacks {', '.join(gaps[:_SHOWN])}{more}, which other servers have: its columns are NULL, its views have no rows"
+    return f"lacks {', '.join(gaps[:_SHOWN])}{more}, which others have: these columns are NULL, these views have no rows and warn"
 
 
 def warnings_of(connection: psycopg.Connection[Any], name: str, state: DatabaseState) -> list[str]:

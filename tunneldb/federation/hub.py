@@ -97,7 +97,10 @@ def drop_hub(connection: psycopg.Connection[Any]) -> None:
     """
     try:
         connection.execute("DROP TABLE tunnel_hub.server")
-        connection.execute("DROP FUNCTION tunnel_hub_internal.warn_away(text), tunnel_hub_internal.copy_comments(text)")
+        connection.execute(
+            "DROP FUNCTION tunnel_hub_internal.warn_away(text), tunnel_hub_internal.warn_lacking(text, text),"
+            " tunnel_hub_internal.copy_comments(text)"
+        )
         connection.execute(sql.SQL("DROP SCHEMA {}, {}").format(sql.Identifier(HUB), sql.Identifier(INTERNAL)))
     except psycopg.errors.DependentObjectsStillExist as error:
         detail = (error.diag.message_detail or "").splitlines()

@@ -100,17 +100,18 @@ def _define(name: str, branches: list[sql.Composed]) -> sql.Composed:
 
 
 def _branches(view: HubView) -> list[sql.Composed]:
-    """Return the parts of a view: warnings of servers that are away, the table of complete servers, incomplete servers.
+    """Return the parts of a view: warnings of servers without rows, the table of complete servers, incomplete servers.
 
     The warnings come first, so that a query with LIMIT, which may not need the later parts, gets them, too.
     """
     columns = sql.SQL(", ").join(sql.Identifier(column.name) for column in view.columns)
     branches = []
-    for server in view.away:
+    for server in (*view.away, *view.lacking):
         constants = sql.SQL(", ").join(_value(column, server) for column in view.columns)
-        warning = sql.SQL("{}({})").format(sql.Identifier(INTERNAL, "warn_away"), sql.Literal(server))
+        function, words = ("warn_away", [server]) if server in view.away else ("warn_lacking", [server, view.name])
+        warning = sql.SQL("{}({})").format(sql.Identifier(INTERNAL, function), sql.SQL(", ").join(map(sql.Literal, words)))
         branches.append(sql.SQL("SELECT {} WHERE {}").format(constants, warning))
-    if view.partitions or not (view.incomplete or view.away):
+    if view.partitions or not (view.incomplete or branches):
         branches.append(sql.SQL("SELECT {} FROM {}").format(columns, sql.Identifier(INTERNAL, view.name)))
     for server, known in view.incomplete.items():
         values = [sql.Identifier(c.name) if c.name in known and c.name != SERVER else _value(c, server) for c in view.columns]

@@ -34,8 +34,8 @@ class HubView:
         Servers that have exactly these columns: partitions, to which joins and aggregates can be sent.
     incomplete
         Servers that lack columns, or have them of another type, with the columns that they have; the others are NULL.
-    away
-        Servers in whose place a branch warns.
+    away, lacking
+        Servers in whose place a branch warns: they do not answer, or are of a version without this view.
     """
 
     name: str
@@ -43,6 +43,7 @@ class HubView:
     partitions: tuple[str, ...]
     incomplete: Mapping[str, frozenset[str]]
     away: tuple[str, ...]
+    lacking: tuple[str, ...]
 
 
 def plan_views(servers: Mapping[str, Tables], away: Collection[str] = ()) -> list[HubView]:
@@ -57,10 +58,11 @@ def plan_views(servers: Mapping[str, Tables], away: Collection[str] = ()) -> lis
         Servers that do not answer. Their columns count, so that views keep their form.
     """
     names = sorted({view for tables in servers.values() for view in tables})
-    return [_plan(name, {server: tables[name] for server, tables in servers.items() if name in tables}, away) for name in names]
+    return [_plan(name, servers, away) for name in names]
 
 
-def _plan(name: str, having: Mapping[str, tuple[Column, ...]], away: Collection[str]) -> HubView:
+def _plan(name: str, servers: Mapping[str, Tables], away: Collection[str]) -> HubView:
+    having = {server: tables[name] for server, tables in servers.items() if name in tables}
     types: dict[str, str] = {}
     for columns in having.values():
         for column in columns:
@@ -74,7 +76,9 @@ def _plan(name: str, having: Mapping[str, tuple[Column, ...]], away: Collection[
             partitions.append(server)
         else:
             incomplete[server] = frozenset(column.name for column in columns if column in wanted)
-    return HubView(name, tuple(wanted), tuple(partitions), incomplete, tuple(server for server in having if server in away))
+    lacking = tuple(server for server in servers if server not in having and server not in away)
+    absent = tuple(server for server in servers if server in away)
+    return HubView(name, tuple(wanted), tuple(partitions), incomplete, absent, lacking)
 
 
 def find_gaps(servers: Mapping[str, Tables]) -> dict[str, list[str]]:
