@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -129,6 +130,22 @@ def test_others_answer_while_a_server_is_away(federation: Federation, west: tupl
         assert prepared.execute(COUNT.encode(), prepare=True).fetchall() == [("north", 1), ("west", 1)]
     with psycopg.connect(federation.hub) as owner:
         assert owner.execute("SELECT name FROM mine ORDER BY name").fetchall() == [("demo",), ("west",)]
+    assert ask(federation.hub, COUNT) == ([("north", 1), ("west", 1)], [])
+
+
+def test_a_server_that_hangs_is_away(federation: Federation, west: tuple[Server, str]) -> None:
+    federation.add("north")
+    federation.federate("add", "west", "--dsn", west[1])
+    postmaster = int((west[0].home().cluster / "postmaster.pid").read_text().split("\n", 1)[0])
+    os.kill(postmaster, signal.SIGSTOP)  # accepts connections, and answers none
+    try:
+        begin = time.monotonic()
+        assert "timeout expired" in federation.federate("check", code=1)
+        assert time.monotonic() - begin < 10
+    finally:
+        os.kill(postmaster, signal.SIGCONT)
+    assert ask(federation.hub, COUNT)[0] == [("north", 1)]
+    federation.federate("check")
     assert ask(federation.hub, COUNT) == ([("north", 1), ("west", 1)], [])
 
 

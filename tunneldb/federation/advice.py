@@ -16,7 +16,7 @@ _SHOWN = 5
 def describe_gaps(gaps: Sequence[str]) -> str:
     """Return what a server lacks, and the consequence."""
     more = f" and {len(gaps) - _SHOWN} more" if len(gaps) > _SHOWN else ""
-    return f"lacks {', '.join(gaps[:_SHOWN])}{more}, which others have: these columns are NULL, these views have no rows and warn"
+    return f"lacks {', '.join(gaps[:_SHOWN])}{more}, which others have: such columns are NULL, such views have no rows and warn"
 
 
 def warnings_of(connection: psycopg.Connection[Any], name: str, state: DatabaseState) -> list[str]:
