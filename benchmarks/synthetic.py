@@ -54,7 +54,7 @@ class Size:
 
 
 def make(connection: Connection, survey: str, size: Size) -> int:
-    """Fill an installed, empty database with a tunnel and its survey.
+    """Fill an installed database with a tunnel and its survey; an earlier and a later one are compared with it.
 
     Parameters
     ----------
@@ -73,7 +73,8 @@ def make(connection: Connection, survey: str, size: Size) -> int:
     connection.execute("SELECT set_config('max_parallel_workers_per_gather', '0', false), setseed(0.42)")
     made = _catalogue(connection, survey, size)
     asked = asdict(size) | {
-        "id": made.id, "survey": survey, "srid": SRID, "spacing": SPACING, "radius": RADIUS, "floor": FLOOR, "corner": CORNER
+        "id": made.id, "survey": survey, "srid": SRID, "spacing": SPACING, "radius": RADIUS, "floor": FLOOR, "corner": CORNER,
+        "earlier": f"{made.tunnel}-2023", "later": f"{made.tunnel}-2026",
     }  # fmt: skip
     for title, steps in STEPS.items():
         progress(title)
@@ -470,7 +471,7 @@ SELECT id, 270, 90, 8 + 0.005 * sin(number / 50.0), 0.0005 FROM tunnel.ring WHER
 # A later survey that was compared with it: sections of 1.5 m, a region every 50 m, and what became of a leak in 25.
 LATER = """
 INSERT INTO tunnel.survey (tunnel_id, name, date, intensity_kind, platform)
-SELECT tunnel_id, 'demo-2026', '2026-05-04', 'none', 'mobile' FROM tunnel.survey WHERE id = %(id)s
+SELECT tunnel_id, %(later)s, '2026-05-04', 'none', 'mobile' FROM tunnel.survey WHERE id = %(id)s
 """
 
 CHANGE_SECTIONS = """
@@ -481,7 +482,7 @@ SELECT n.id, %(id)s, floor(c / 1000), c, c + 1.5, 30, 30, CASE WHEN k %% 50 = 0 
 FROM tunnel.survey n, generate_series(0, %(kilometres)s * 1000 * 2 / 3 - 1) AS k
 CROSS JOIN LATERAL (SELECT k * 1.5 AS c) q
 CROSS JOIN LATERAL (SELECT array_agg((0.001 * sin((k + i) / 30.0))::real) AS cells FROM generate_series(1, 201) AS i) v
-WHERE n.name = 'demo-2026'
+WHERE n.name = %(later)s
 """
 
 CHANGE_REGIONS = """
@@ -492,7 +493,7 @@ SELECT n.id, %(id)s, floor(c / 1000), c, c + 1, 0, 1, 1, 1, 0.004 * sin(k), 0.00
 FROM tunnel.survey n, generate_series(0, %(kilometres)s * 20 - 1) AS k
 CROSS JOIN LATERAL (SELECT k * 50.0 + 20 AS c) q
 CROSS JOIN LATERAL (SELECT ST_MakeEnvelope(c, 0, c + 1, 1, 0) AS box) b
-WHERE n.name = 'demo-2026'
+WHERE n.name = %(later)s
 """
 
 LEAK_CHANGES = """
@@ -501,12 +502,12 @@ INSERT INTO tunnel.leak_change (survey_id, old_survey_id, km, state, old_ids, ne
 SELECT n.id, %(id)s, a.km, CASE a.id %% 25 WHEN 0 THEN 'grown' WHEN 1 THEN 'dry' ELSE 'same' END, ARRAY[a.id], ARRAY[a.id],
     '{leak}', '{leak}', a.area, 0.02, a.area * (1 + (a.id %% 25 = 0)::int), 0.02, 1, 1, a.chainage_from, a.chainage_to, a.clock,
     ST_Multi(a.unrolled), ST_Multi(a.map), ST_Multi(a.surface)
-FROM tunnel.survey n, tunnel.finding a WHERE n.name = 'demo-2026' AND a.survey_id = %(id)s AND a.wet
+FROM tunnel.survey n, tunnel.finding a WHERE n.name = %(later)s AND a.survey_id = %(id)s AND a.wet
 """
 
 SURFACES = """
 INSERT INTO tunnel.survey (tunnel_id, name, date, intensity_kind, platform)
-SELECT tunnel_id, 'demo-2023', '2023-05-04', 'none', 'mobile' FROM tunnel.survey WHERE id = %(id)s
+SELECT tunnel_id, %(earlier)s, '2023-05-04', 'none', 'mobile' FROM tunnel.survey WHERE id = %(id)s
 """
 
 # Of a hundred sections one is thinner than 0.2 m somewhere.
@@ -517,7 +518,7 @@ SELECT %(id)s, b.id, c / 1000, 'lining', c, c + 1, 25.1, 20, 6.0, 0.002, 3, 1, 0
     v.least || array_fill(0.3::real, ARRAY[250])
 FROM generate_series(0, %(kilometres)s * 1000 - 1) AS c
 CROSS JOIN LATERAL (SELECT CASE WHEN c %% 100 = 50 THEN 0.15 ELSE 0.25 END::real AS least) v
-JOIN tunnel.survey b ON b.name = 'demo-2023'
+JOIN tunnel.survey b ON b.name = %(earlier)s
 """
 
 EVENNESS = """
@@ -543,7 +544,8 @@ SELECT d.id, n, 'block ' || n, 10 * n - 10, 10 * n FROM d, generate_series(1, %(
 
 SCHEMES = """
 WITH s AS (INSERT INTO tunnel.rating_scheme (name, version, source, results)
-           VALUES ('example', '1', 'benchmark', '{A,B,C,D}'), ('count', '1', 'benchmark', '{A,B,C,D}') RETURNING id, name)
+           VALUES ('example', '1', 'benchmark', '{A,B,C,D}'), ('count', '1', 'benchmark', '{A,B,C,D}')
+           ON CONFLICT DO NOTHING RETURNING id, name)
 INSERT INTO tunnel.rating_rule (scheme_id, number, text, kinds, measure, inclusive, limits, results)
 SELECT s.id, r.n, r.text, r.kinds, r.measure, r.inclusive, r.limits, r.results
 FROM s JOIN (VALUES

@@ -14,6 +14,7 @@ import psycopg
 import pytest
 import shapely
 from click.testing import CliRunner
+from psycopg.conninfo import make_conninfo
 
 from tunneldb.cli.main import COMMANDS, main
 
@@ -244,6 +245,19 @@ def test_what_is_pruned_and_vacuumed_is_told_in_rows_and_bytes(example: str, con
     dead = told(0, "vacuum")
     assert dead["dead_bytes"] == sum(table["dead_bytes"] for table in dead["tables"])
     assert not dead["done"]
+
+
+def test_a_hub_tells_its_servers(people: None, example: str, dsn: str, empty_dsn: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TUNNELDB_DSN", empty_dsn)
+    assert told(0, "federate", "list")["servers"] == []
+    added = told(0, "federate", "add", "north", "--dsn", make_conninfo(dsn, user="vera"))
+    assert (added["name"], added["tunnels"], added["surveys"], added["warnings"]) == ("north", 1, 1, [])
+    (listed,) = told(0, "federate", "list")["servers"]
+    assert (listed["name"], listed["state"], listed["user"], listed["surveys"]) == ("north", "present", "vera", 1)
+    checked = told(0, "federate", "check")
+    assert [server["state"] for server in checked["servers"]] == ["present"]
+    assert (checked["went_away"], checked["returned"], checked["warnings"]) == ([], [], [])
+    assert told(0, "federate", "remove", "north")["remaining"] == 0
 
 
 def test_no_verb_was_left_out() -> None:

@@ -103,6 +103,7 @@ GROUPS: dict[str, dict[str, tuple[str, str]]] = {
         "prune": ("tunneldb.cli.prune:prune", "Show or delete runs and jobs that are no longer needed."),
         "vacuum": ("tunneldb.cli.vacuum:vacuum", "Show or free the disk space of deleted rows."),
         "psql": ("tunneldb.cli.psql:psql", "Open psql on the database."),
+        "federate": ("tunneldb.cli.federate:federate", "Show the tunnels of several servers in the views of one database."),
         "server": ("tunneldb.cli.server:server", "Start, stop or show the embedded server."),
     },
     "Simulate": {

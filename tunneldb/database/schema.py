@@ -24,10 +24,11 @@ if TYPE_CHECKING:
 HEAD = "0001"
 """Newest migration, stated here so that a command need not import Alembic if the database is up to date."""
 
-API_SCHEMAS = ("tunnel_api", "tunnel_internal")
-"""Schemas of the SQL files, dropped and installed as a whole: functions for users and QGIS, and their helpers."""
+API_SCHEMAS = ("tunnel_api", "tunnel_internal", "tunnel_shared")
+"""Schemas of the SQL files, dropped and installed as a whole: functions for users and QGIS, their helpers, views for a hub."""
 
 _INTERNAL = "Functions and views behind tunnel_api and the program; not to be called by users; created again by tunneldb init"
+_SHARED = "Views of tunnel_api for a hub (tunneldb federate); created again by tunneldb init"
 
 _LOCK = 7088630451  # arbitrary number; two installations of one database wait for each other
 _LAYERS_LOCK = 7088630452  # the one of tunnel_api.make_layers
@@ -268,7 +269,7 @@ def install_api(connection: psycopg.Connection[Any]) -> None:
             raise
     if before != version:
         connection.execute("DELETE FROM tunnel.waterproof")
-    for schema, comment in zip(API_SCHEMAS, (version, _INTERNAL), strict=True):
+    for schema, comment in zip(API_SCHEMAS, (version, _INTERNAL, _SHARED), strict=True):
         connection.execute(sql.SQL("COMMENT ON SCHEMA {} IS {}").format(sql.Identifier(schema), sql.Literal(comment)))
 
 
@@ -283,7 +284,8 @@ def sql_files() -> list[Path]:
     folder = resource_dir("sql")
     lines = (folder / "install.txt").read_text("utf-8").splitlines()
     listed = [line.strip() for line in lines if line.strip() and not line.startswith("#")]
-    different = {path.relative_to(folder).as_posix() for path in folder.rglob("*.sql")} ^ set(listed)
+    present = {path.relative_to(folder).as_posix() for path in folder.rglob("*.sql")}
+    different = {name for name in present if not name.startswith("hub/")} ^ set(listed)  # hub/: tunneldb.federation
     if different:
         raise ValueError(f"{folder / 'install.txt'} and its folder differ in {', '.join(sorted(different))}")
     return [folder / name for name in listed]

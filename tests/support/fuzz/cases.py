@@ -81,6 +81,7 @@ OF_WORDS: tuple[str, ...] = (
     "survey list", "survey add {new} --tunnel demo --date 2024-05-04 --stations {seeds}/stations.csv --intensity-kind none",
     "survey set scan-2024 --date 2024-05-05", "survey remove scan-2024 --yes", "survey export demo-2024 -o {out}.tdb",
     "survey import {seeds}/survey.tdb --name {new}", "survey sizes", "prune", "vacuum",
+    "federate list", "federate add {new} --dsn postgresql://vera@127.0.0.1:9/tunneldb", "federate remove {new}",
     "load scan-2024 {seeds}/cloud.las", "run demo-2024",
     "batch scan-2024 {seeds}/cloud.las --preview", "stop", "status demo-2024", "check",
     "leaks demo-2024", "leaks demo-2024 -o {out}.csv", "findings list demo-2024", "findings list demo-2024 -o {out}.gpkg",
@@ -121,6 +122,7 @@ UNTRIED = {
     "survey remove-file": "has no options but the file",
     "tunnel find-axis": "what goes wrong lies in its file",
     "serve": "serves until it is told to leave",
+    "federate check": "repeats until it is stopped",
     "worker": "works until it is told to leave",
     "psql": "hands its words on to another program",
     "server start": "has no options",
@@ -131,9 +133,9 @@ UNTRIED = {
 
 REFUSED = (
     "actions remove", "alarms remove", "clearance", "compare", "elements remove", "evaluate", "export scan-2024",
-    "findings undo", "ground", "intensity", "learn demo-2024", "members demo", "profile remove", "rating change",
-    "rating remove", "register", "run", "serve", "spheres", "survey remove-file", "thickness", "tunnel add {new} {file}",
-    "tunnel find-axis", "tunnel remove",
+    "federate add", "federate remove", "findings undo", "ground", "intensity", "learn demo-2024", "members demo",
+    "profile remove", "rating change", "rating remove", "register", "run", "serve", "spheres", "survey remove-file",
+    "thickness", "tunnel add {new} {file}", "tunnel find-axis", "tunnel remove",
 )  # fmt: skip
 """What right commands begin with that the survey made by hand has no rows for: they are to say so in one line."""
 
