@@ -46,6 +46,19 @@ def test_a_room_with_a_pump_is_doubted_and_surveyed(dsn: str, tmp_path: Path) ->
     assert "Leaks were not searched for: the survey has no intensity" in text
 
 
+def test_the_pump_itself_has_faces_and_no_spot(tmp_path: Path) -> None:
+    """Its scan has no pose: without a station it is refused, with one at the origin of its coordinates it is searched."""
+    scan, stations = str(real_scan("pump.e57")), tmp_path / "stations.csv"
+    options = ["--intensity", "intensity", "--intensity-kind", "linear", "-o", str(tmp_path / "pump.gpkg")]
+    refused = CliRunner().invoke(main, ["members", scan, *options])
+    assert refused.exit_code == 2
+    assert "scan 1 (pumpA) has no pose" in refused.stderr
+    stations.write_text("scan_id,x,y,z\n1506376252,0,0,0\n")
+    said = run("members", scan, "--stations", str(stations), *options)
+    assert "0 spots" in said
+    assert int(said.split(" members of ")[1].split(" ")[0]) > 100
+
+
 @pytest.mark.parametrize("separator", [",", "\t"])
 def test_rings_of_single_points_are_refused_at_once(separator: str, tmp_path: Path) -> None:
     """Eight points a ring, measured by total station, are no scan: none has others near it."""
