@@ -12,7 +12,7 @@ from functools import cache
 _POOLS = ("NUMBA_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "RAYON_NUM_THREADS", "GDAL_NUM_THREADS")
 _chosen: list[int] = []
 _own = threading.local()
-"""Of each thread: `busy` is True if it works for `in_blocks`."""
+"""Values of each thread. `busy` is True if the thread works for `in_blocks`."""
 
 
 def use_threads(count: int) -> None:

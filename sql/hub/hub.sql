@@ -1,5 +1,5 @@
--- Schemas of a hub, by tunneldb federate add: tunnel_hub has the views over all servers, tunnel_hub_internal the tables of which the
--- servers' foreign tables are partitions. Runs again at each change; nothing of it is installed by tunneldb init.
+-- Schemas of a hub, made by tunneldb federate add. Schema tunnel_hub has the views over all servers. Schema tunnel_hub_internal has
+-- partitioned tables, whose partitions are the servers' foreign tables. This file runs at each change, and not in tunneldb init.
 
 CREATE SCHEMA IF NOT EXISTS tunnel_hub;
 COMMENT ON SCHEMA tunnel_hub IS 'Views of tunnel_api over all servers of the hub; made by tunneldb federate';

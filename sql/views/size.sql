@@ -1,5 +1,5 @@
--- Disk space of surveys. Reads the catalogue, its statistics and file sizes only; of partitions of points, of which there may be
--- thousands, the catalogue alone: to ask for the size of their files takes six times as long.
+-- Disk space of surveys. Reads only the catalogue, its statistics and file sizes. There may be thousands of partitions of points:
+-- their sizes are read from the catalogue, because reading the sizes of their files takes six times as long.
 
 -- Kind of data in each table. A table that is not listed is a result.
 CREATE OR REPLACE FUNCTION tunnel_internal.table_kind(name text) RETURNS text

@@ -27,7 +27,7 @@ def refused(federation: Federation, *words: object) -> str:
 
 
 def traces(dsn: str) -> list[tuple[str, ...]]:
-    """What a hub adds to its database."""
+    """Schemas and functions of a hub in its database."""
     with psycopg.connect(dsn) as connection:
         return connection.execute(
             "SELECT 'schema', nspname::text FROM pg_namespace WHERE nspname !~ '^pg_' UNION ALL"

@@ -1,4 +1,4 @@
-"""What the laser shows of walls and ladders above the water. All is drawn here: x along, y across, water at z 0."""
+"""Walls and ladders above the water in laser points. The points are made here: x along, y across, water at z 0."""
 
 from __future__ import annotations
 

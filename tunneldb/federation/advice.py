@@ -1,4 +1,4 @@
-"""What a user should know of a server that answers: columns that it lacks, rights of its login, its locale."""
+"""Warnings about a server that answers: missing columns, rights of its login, its locale."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ HUB = "tunnel_hub"
 """Schema of the views over all servers, for users."""
 
 INTERNAL = "tunnel_hub_internal"
-"""Schema of the tables of which the foreign tables are partitions."""
+"""Schema of the partitioned tables. Their partitions are the foreign tables."""
 
 SHARED = "tunnel_shared"
 """Schema of each server that is imported: the views of tunnel_api with a column ``server``."""

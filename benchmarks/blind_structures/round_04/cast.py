@@ -26,7 +26,7 @@ class Noise:
 
 @dataclass(frozen=True)
 class Material:
-    """How a surface reflects.
+    """Reflection of a surface.
 
     `db` is ten times the logarithm of its reflectance. The echo falls with `cosine ** power`.
     A lobe of `lobe` times the diffuse part, `width` degrees wide, stands around 0 degrees.
@@ -71,7 +71,7 @@ def _frame(w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 @dataclass(eq=False)
 class Body:
-    """What faces and tubes share. A body that is not `smooth` has no surface number."""
+    """Properties of faces and tubes. A body that is not `smooth` has no surface number."""
 
     material: Material
     smooth: bool = True
@@ -154,7 +154,7 @@ class Tube(Body):
 
 @dataclass
 class Hits:
-    """What rays meet: range, cosine, number of the body (-1 for none), side, and coordinates."""
+    """Hits of rays: range, cosine, number of the body (-1 for none), side, and coordinates."""
 
     t: np.ndarray
     cosine: np.ndarray

@@ -29,7 +29,7 @@ class Station:
 
 @dataclass(frozen=True)
 class Instrument:
-    """How the laser measures.
+    """Properties of the laser.
 
     `level` is the amplitude at 10 m of a white surface at 0 degrees, `near` the range in m below which light is lost.
     `noise` is in dB, `ranging` in m, `beam` is the full divergence in mrad.
