@@ -19,7 +19,7 @@ from tunneldb.pointcloud.formats.faults import check_ranges, decoding, require_d
 from tunneldb.pointcloud.formats.las_bounds import POINTWISE, check_envelope, count_contradiction, point_counts
 from tunneldb.pointcloud.formats.las_header import HEADER_SIZE
 from tunneldb.pointcloud.formats.laz_chunks import VariedChunks, count_points
-from tunneldb.pointcloud.points import CHUNK, Ranges, Raw, ScanHeader
+from tunneldb.pointcloud.points import CHUNK, COLOURS, Ranges, Raw, ScanHeader
 from tunneldb.pointcloud.stated_crs import StatedCrs, stated_in_las
 from tunneldb.threads import threads
 
@@ -207,7 +207,7 @@ class _Taker:
             array["point_source_id"],
             self._intensity(record),
             np.asarray(record["classification"]),
-            np.column_stack([array[name] for name in ("red", "green", "blue")]) if self.coloured else None,
+            np.column_stack([array[name] for name in COLOURS]) if self.coloured else None,
         )
 
     def _intensity(self, record: Any) -> NDArray[Any] | None:
