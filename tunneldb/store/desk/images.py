@@ -8,12 +8,13 @@ from typing import Any
 
 import psycopg
 
-from tunneldb.raster.geotiff import Raster, decode
+from tunneldb.raster.geotiff import RGB, Raster, decode
 from tunneldb.raster.overview import PREFIX
 
 KINDS = {
     "corrected": ("Corrected intensity", "dB"),
     "raw": ("Raw intensity", "dB"),
+    RGB: ("Colour", ""),
     "offset": ("Offset from the surface", "m"),
     "state": ("State of the pixels", ""),
     "deviation_lining": ("Deviation of the lining", "m"),
