@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from tunneldb.arrays import Bool, Int32, Single, UInt16, Whole
-from tunneldb.compiled import kernel, point_kernel
+from tunneldb.compiled import inner, kernel, point_kernel
 from tunneldb.pointcloud.points import MAX_COLOUR
 from tunneldb.raster.block_sums import MAX_STEPS, BlockSums
 from tunneldb.raster.grid import Grid
@@ -129,16 +129,21 @@ def _add(
 ) -> None:  # pragma: no cover - compiled
     """Add the points of a block, into every ``parts``-th of its rows."""
     width = sums.shape[1]
-    scale = MAX_COLOUR // maximum
     for i in range(row.shape[0]):
         r, c = row[i], column[i] - first
         if 0 <= c < width and r % parts == part and sums[r, c, 0] <= full:
-            red, green, blue = np.int64(colour[i, 0]), np.int64(colour[i, 1]), np.int64(colour[i, 2])
-            if red + green + blue > 0:
+            red, green, blue = colour[i, 0], colour[i, 1], colour[i, 2]
+            if red > 0 or green > 0 or blue > 0:
                 sums[r, c, 0] += weight[i]
-                sums[r, c, 1] += weight[i] * ((min(red, maximum) * scale) >> SHIFT)
-                sums[r, c, 2] += weight[i] * ((min(green, maximum) * scale) >> SHIFT)
-                sums[r, c, 3] += weight[i] * ((min(blue, maximum) * scale) >> SHIFT)
+                sums[r, c, 1] += weight[i] * _steps(red, maximum)
+                sums[r, c, 2] += weight[i] * _steps(green, maximum)
+                sums[r, c, 3] += weight[i] * _steps(blue, maximum)
+
+
+@inner
+def _steps(value: int, maximum: int) -> int:  # pragma: no cover - compiled
+    """Return red, green or blue as steps for summing, MAX_STEPS for the maximum."""
+    return (min(int(value), maximum) * (MAX_COLOUR // maximum)) >> SHIFT
 
 
 @point_kernel
