@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import base64
+import io
+import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -104,3 +108,18 @@ def test_images_in_colour_are_exported_and_shown(conn: psycopg.Connection, tmp_p
     preview = np.asarray(Image.open(tmp_path / "images" / f"{NAME}-km012-rgb.png").convert("RGB"))
     for colour in ((200, 60, 40), (40, 160, 90), (50, 80, 220), (230, 220, 40)):
         assert (np.abs(preview.astype(int) - colour).max(axis=2) <= 2).sum() > 1000
+    command("report", NAME, "-o", tmp_path / "report.html")
+    details = re.findall(
+        r'<script type="application/json">(\{.*?\})</script>', (tmp_path / "report.html").read_text("utf-8"), re.S
+    )
+    shown = [leak for strip in details for leak in json.loads(strip).values()]
+    assert shown
+    for leak in shown:
+        grey, colour = (_picture(leak[name]) for name in ("picture", "colour"))
+        assert grey.size == colour.size
+        assert np.ptp(np.asarray(grey).reshape(-1, 3).astype(int), axis=1).mean() < 20
+        assert np.ptp(np.asarray(colour).reshape(-1, 3).astype(int), axis=1).mean() > 40
+
+
+def _picture(url: str) -> Image.Image:
+    return Image.open(io.BytesIO(base64.b64decode(url.partition(",")[2]))).convert("RGB")
