@@ -32,7 +32,8 @@ class ColourDepth:
     Attributes
     ----------
     maximum : int
-        Value of full red, green or blue: EIGHT_BITS or MAX_COLOUR; 0 if no point of the sample has a colour.
+        Value of full red, green or blue: EIGHT_BITS or MAX_COLOUR; 0 if no point of the sample has a colour, or colours are
+        fractions of 1.
     sampled : bool
         True if the values decided, not the format.
     """
@@ -45,7 +46,7 @@ class ColourDepth:
         if not self.sampled or self.maximum == MAX_COLOUR:
             return None
         if not self.maximum:
-            return f"{path.name}: has fields for colours, but its points are black; no image in colour"
+            return f"{path.name}: has fields for colours, but they are black or fractions of 1; no image in colour"
         return f"{path.name}: no colour is above {EIGHT_BITS}, so colours are read as 8 bits"
 
 
@@ -75,4 +76,4 @@ def _sampled(path: Path, version: tuple[int, int]) -> ColourDepth:
     for raw in format_of(path).read(path, None, CHUNK, ranges, True):
         if raw.colour is not None:
             most = max(most, int(raw.colour.max(initial=0)))
-    return ColourDepth(MAX_COLOUR if most > EIGHT_BITS else EIGHT_BITS if most else 0)
+    return ColourDepth(MAX_COLOUR if most > EIGHT_BITS else EIGHT_BITS if most > 1 else 0)
