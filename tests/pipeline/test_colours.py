@@ -59,7 +59,7 @@ def test_pixels_have_the_colours_of_their_places(
     output = run(tmp_path)
     assert ("colours are read as 8 bits" in output) == (full == 255)
     (tiff,) = blocks(conn, "rgb")
-    image, plain = decode(tiff), decode(blocks(conn, "corrected")[0])
+    image, plain = decode(tiff, "rgb"), decode(blocks(conn, "corrected")[0])
     assert image.transform == plain.transform
     chainage, arc = np.meshgrid(*image.places())
     expected = stripes(chainage.ravel(), arc.ravel()).reshape(*chainage.shape, 3) * 255
@@ -78,7 +78,7 @@ def test_pixels_have_the_colours_of_their_places(
     off = np.abs(image.values[both] - expected[both]).max(axis=1)
     assert (off <= 1.0).mean() > 0.999
     (overview,) = blocks(conn, "overview_rgb")
-    assert decode(overview).values.shape[2] == 3
+    assert decode(overview, "overview_rgb").values.shape[2] == 3
 
 
 @pytest.mark.slow
@@ -95,7 +95,7 @@ def test_images_in_colour_are_exported_and_shown(conn: psycopg.Connection, tmp_p
     survey(tmp_path)
     paint(tmp_path, stripes)
     run(tmp_path)
-    stored = decode(blocks(conn, "rgb")[0])
+    stored = decode(blocks(conn, "rgb")[0], "rgb")
     command("image", NAME, "-o", tmp_path / "images")
     with rasterio.open(tmp_path / "images" / f"{NAME}-km012-rgb.tif") as image:
         assert image.descriptions == ("red", "green", "blue", "opacity")

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from tunneldb.errors import UserError
 from tunneldb.raster.colour_sums import ColourSums
 from tunneldb.raster.geotiff import RGB, Raster, decode, encode
 from tunneldb.raster.grid import Grid
@@ -117,7 +118,11 @@ def test_stored_colours_are_those_of_8_bits() -> None:
     values[5:9, 5:9] = np.nan
     values[20, 20] = 0.3
     raster = Raster(values, GRID.transform())
-    found = decode(encode(raster, RGB))
+    found = decode(encode(raster, RGB), RGB)
+    with pytest.raises(UserError, match="has 3 bands"):
+        decode(encode(raster, RGB))
+    with pytest.raises(UserError, match="has 1 bands"):
+        decode(encode(Raster(values[:, :, 0], raster.transform), "raw"), RGB)
     assert found.transform == raster.transform
     expected = values.copy()
     expected[20, 20] = (0, 0, 1)

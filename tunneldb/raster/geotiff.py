@@ -140,20 +140,25 @@ def whole_colours(values: Single) -> UInt8:
     return whole
 
 
-def decode(tiff: bytes) -> Raster:
+def decode(tiff: bytes, kind: str = "") -> Raster:
     """Read an image that :func:`encode` wrote.
+
+    An image in colour is read only if its kind, or that of its overview, is given.
 
     Bytes of other origin, for example from an archive, are read as GeoTIFF only: a VRT could make GDAL read other files.
 
     Raises
     ------
     UserError
-        If it is not a GeoTIFF.
+        If it is not a GeoTIFF, or has other bands than its kind.
     """
     with warnings.catch_warnings(), _told():
         warnings.simplefilter("ignore", NotGeoreferencedWarning)
         with MemoryFile(tiff) as memory, memory.open(driver="GTiff") as image:
-            if image.count > 1:
+            coloured = kind.endswith(RGB)
+            if image.count != (3 if coloured else 1):
+                raise UserError(f"an image in the database has {image.count} bands; run stage detect again")
+            if coloured:
                 bands = np.moveaxis(image.read((1, 2, 3)), 0, 2)
                 return Raster(np.where(bands.any(axis=2, keepdims=True), bands, np.float32(np.nan)), image.transform)
             steps = image.read(1)

@@ -65,7 +65,7 @@ def load_kinds(conn: psycopg.Connection[Any], survey: Survey, km: int, block: in
         (survey.id, km, block, list(kinds)),
         binary=True,
     ).fetchall()
-    return {kind: decode(tiff) for kind, tiff in rows}
+    return {kind: decode(tiff, kind) for kind, tiff in rows}
 
 
 def load_regions(conn: psycopg.Connection[Any], survey: Survey, km: int, kind: str) -> list[Polygon]:

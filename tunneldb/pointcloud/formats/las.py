@@ -28,6 +28,12 @@ FIRST_OF_WKT = 6
 """Point format from which a coordinate system is stated by WKT only."""
 
 
+COLOURED = frozenset((2, 3, 5, 7, 8, 10))
+"""Point formats with colours."""
+
+_POINT_FORMAT = 104  # its offset in the header, bytes; the highest bits mark compression
+
+
 @dataclass(frozen=True)
 class ExtraBytes:
     """A dimension in the extra bytes of a point.
@@ -78,6 +84,13 @@ def read_las_header(path: Path) -> ScanHeader:
         raise InputError(f"{path}: the file holds no points")
     _check_scales(path, scales, offsets)
     return ScanHeader(path, count, dimensions, stated, np.array(header.mins), np.array(header.maxs), notes=notes)
+
+
+def has_las_colours(path: Path) -> bool:
+    """Return True if the point format of a LAS or LAZ file has colours; reads the beginning of the header only."""
+    with decoding(path, KIND), path.open("rb") as file:
+        start = file.read(_POINT_FORMAT + 1)
+    return len(start) > _POINT_FORMAT and start[_POINT_FORMAT] & 0b111111 in COLOURED
 
 
 def open_las(path: Path, **options: Any) -> laspy.LasReader:

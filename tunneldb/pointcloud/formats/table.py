@@ -8,7 +8,7 @@ from pathlib import Path
 
 from tunneldb.errors import InputError
 from tunneldb.pointcloud.formats.e57 import read_e57, read_e57_header, read_e57_scans
-from tunneldb.pointcloud.formats.las import read_las, read_las_header
+from tunneldb.pointcloud.formats.las import has_las_colours, read_las, read_las_header
 from tunneldb.pointcloud.formats.las_header import SIGNATURE
 from tunneldb.pointcloud.formats.ply import has_ply_colours, read_ply, read_ply_header
 from tunneldb.pointcloud.formats.ptx import read_ptx, read_ptx_scans
@@ -120,7 +120,7 @@ _LAS = Format(
     "LAS or LAZ",
     read_las_header,
     read_las,
-    lambda path: "red" in read_las_header(path).dimensions,
+    has_las_colours,
     is_las=True,
 )
 _TABLE = _of_text("table of points", read_table)

@@ -60,7 +60,7 @@ def load_blocks(
         "SELECT block, tiff FROM tunnel_api.image_tiffs(%s, %s, %s)", [survey_id, kind, list(numbers)], binary=True
     )
     for number, tiff in rows.fetchall():
-        yield number, decode(tiff)
+        yield number, decode(tiff, kind)
 
 
 def overview_of(kind: str) -> str:
