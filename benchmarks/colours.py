@@ -57,8 +57,8 @@ def paint(path: Path) -> None:
     painted.replace(path)
 
 
-def measure(dsn: str, folder: Path, length: float, full: bool) -> dict[str, Any]:
-    """Simulate, paint and prepare a tunnel; run `detect` on it in both ways, twice."""
+def measure(dsn: str, folder: Path, length: float, full: bool, turns: int) -> dict[str, Any]:
+    """Simulate, paint and prepare a tunnel; run `detect` on it in both ways, in turns."""
     progress(f"simulating {length:g} m")
     density = () if full else ("--density", 100)
     options = ("--length", length, "--radius", 4000, "--s-curve", "--scanner", "profiler", "--no-truth", *density)
@@ -70,7 +70,7 @@ def measure(dsn: str, folder: Path, length: float, full: bool) -> dict[str, Any]
     progress("to its ground")
     tunneldb("batch", NAME, *scene.scans, "--to", "ground", dsn=dsn)
     found: dict[str, list[Cost]] = {"without": [], "with": []}
-    for turn in (1, 2):
+    for turn in range(1, turns + 1):
         for name, costs in found.items():
             progress(f"detect, {name} colours, turn {turn}")
             costs.append(watch([[sys.executable, "-c", DETECT, name, NAME]], dsn))
@@ -118,10 +118,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--dsn", help="server to use; default: the embedded one")
     parser.add_argument("--length", type=float, default=25_000.0, help="length of the tunnel, m")
+    parser.add_argument("--turns", type=int, default=2, help="number of runs in each way, of which the least is stated")
     parser.add_argument("--full", action="store_true", help="full density")
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as temporary, scratch_database(arguments.dsn) as dsn:
-        figures = measure(dsn, Path(temporary), arguments.length, arguments.full)
+        figures = measure(dsn, Path(temporary), arguments.length, arguments.full, arguments.turns)
     report(figures)
     print(f"\n{save('colours', figures)}")
 
