@@ -128,15 +128,15 @@ def _encode_colours(raster: Raster) -> bytes:
     }
     with MemoryFile() as memory:
         with memory.open(**profile) as image:
-            image.write(np.moveaxis(whole_colours(raster.values), 2, 0))
+            image.write(whole_colours(raster.values))
         return bytes(memory.read())
 
 
 def whole_colours(values: Single) -> UInt8:
-    """Convert colours (rows, columns, 3) to 8 bits: black for NaN, and the darkest blue for a measured black."""
-    coloured = np.isfinite(values[:, :, 0])
-    whole: UInt8 = np.rint(np.where(coloured[:, :, None], values, 0.0)).astype(np.uint8)
-    whole[:, :, 2] |= coloured & ~whole.any(axis=2)
+    """Convert colours (rows, columns, 3) to 8 bits (3, rows, columns): black for NaN, the darkest blue for a measured black."""
+    rows, columns, bands = values.shape
+    whole: UInt8 = np.empty((bands, rows, columns), np.uint8)
+    _whole_colours(np.ascontiguousarray(values), whole)
     return whole
 
 
@@ -183,6 +183,20 @@ def laid(raster: Raster, like: Raster) -> Single:
     rows = slice(max(down, 0), min(down + len(raster.values), len(values)))
     values[rows] = raster.values[rows.start - down : rows.stop - down]
     return values
+
+
+@kernel
+def _whole_colours(values: Single, whole: UInt8) -> None:  # pragma: no cover - compiled
+    for i in range(values.shape[0]):
+        for j in range(values.shape[1]):
+            present = not np.isnan(values[i, j, 0])
+            black = True
+            for band in range(3):
+                value = np.uint8(np.rint(values[i, j, band])) if present else np.uint8(0)
+                whole[band, i, j] = value
+                black = black and value == 0
+            if present and black:
+                whole[2, i, j] = 1
 
 
 @kernel
