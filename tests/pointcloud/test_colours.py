@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import struct
 from pathlib import Path
 
 import laspy
 import numpy as np
 import pytest
+from support.command import command
 
 from tunneldb.pointcloud.colour_depth import RUN_POINTS, WHOLE, ColourDepth, colour_depth
 from tunneldb.pointcloud.formats.table import has_colours
@@ -103,3 +105,11 @@ def test_a_few_bright_points_of_a_large_file_decide(tmp_path: Path, seed: int) -
     values[:50_000] = 9
     las(tmp_path / "a.laz", values, 7)
     assert colour_depth(tmp_path / "a.laz") == ColourDepth(65535)
+
+
+def test_inspect_states_the_bits(tmp_path: Path) -> None:
+    las(tmp_path / "a.laz", COLOURS, 7)
+    (tmp_path / "b.csv").write_text("x y z\n" + "".join(f"{x} {y} {z}\n" for x, y, z in XYZ.tolist()))
+    for name, stated in (("a.laz", "8 bits, by a sample"), ("b.csv", None)):
+        (look,) = json.loads(command("inspect", tmp_path / name, "--json").stdout)["files"]
+        assert look["colours"] == stated

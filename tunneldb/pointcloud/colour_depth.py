@@ -41,6 +41,10 @@ class ColourDepth:
     maximum: int
     sampled: bool = True
 
+    def __str__(self) -> str:
+        bits = {0: "black or fractions of 1, not usable", EIGHT_BITS: "8 bits", MAX_COLOUR: "16 bits"}[self.maximum]
+        return f"{bits}, by a sample" if self.sampled else bits
+
     def note(self, path: Path) -> str | None:
         """Return a note for the user on what was assumed; None if nothing was."""
         if not self.sampled or self.maximum == MAX_COLOUR:
