@@ -50,13 +50,13 @@ CREATE TABLE tunnel.image (
     block INTEGER NOT NULL,
     tiff BYTEA NOT NULL,
     CONSTRAINT image_pkey PRIMARY KEY (survey_id, km, kind, block),
-    CONSTRAINT image_kind_check CHECK (kind IN ('raw', 'corrected', 'offset', 'state', 'deviation_lining', 'deviation_shotcrete', 'deviation_excavation', 'overview_raw', 'overview_corrected', 'overview_offset', 'overview_state', 'overview_deviation_lining', 'overview_deviation_shotcrete', 'overview_deviation_excavation'))
+    CONSTRAINT image_kind_check CHECK (kind IN ('raw', 'corrected', 'offset', 'rgb', 'state', 'deviation_lining', 'deviation_shotcrete', 'deviation_excavation', 'overview_raw', 'overview_corrected', 'overview_offset', 'overview_rgb', 'overview_state', 'overview_deviation_lining', 'overview_deviation_shotcrete', 'overview_deviation_excavation'))
 )
  PARTITION BY LIST (survey_id);
 COMMENT ON TABLE tunnel.image IS 'Unrolled images in blocks of 50 m: partition image_s<survey>';
 COMMENT ON COLUMN tunnel.image.survey_id IS 'Survey that the row belongs to';
 COMMENT ON COLUMN tunnel.image.km IS 'Kilometre: floor(chainage / 1000)';
-COMMENT ON COLUMN tunnel.image.kind IS 'raw or corrected intensity, dB, offset from the surface, m, state of the pixel, or deviation from the design profiles of a layer, m; overview_KIND: the same of a whole kilometre, with pixels of about 0.4 m';
+COMMENT ON COLUMN tunnel.image.kind IS 'raw or corrected intensity, dB, offset from the surface, m, colour (rgb), state of the pixel, or deviation from the design profiles of a layer, m; overview_KIND: the same of a whole kilometre, with pixels of about 0.4 m';
 COMMENT ON COLUMN tunnel.image.block IS 'Block along the tunnel: floor(chainage / 50); of an overview the first of its kilometre';
 COMMENT ON COLUMN tunnel.image.tiff IS 'GeoTIFF in the unrolled plane (chainage, arc), m';
 

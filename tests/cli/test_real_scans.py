@@ -7,11 +7,14 @@ import shlex
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+import rasterio
 from click.testing import CliRunner
 from support.real_scans import real_scan
 
 from tunneldb.cli.main import main
+from tunneldb.pointcloud.reader import read_chunks
 
 UNPOSED = "--no-poses in place of --stations, with intensity of kind reflectance or none"
 """What `inspect` says of scans of which nobody knows where the scanner stood."""
@@ -44,6 +47,17 @@ def test_a_room_with_a_pump_is_doubted_and_surveyed(dsn: str, tmp_path: Path) ->
     run("report", "pump-scan", "-o", str(tmp_path / "report.html"))
     text = (tmp_path / "report.html").read_text("utf-8")
     assert "Leaks were not searched for: the survey has no intensity" in text
+    # Each point of the scan has a colour.
+    run("image", "pump-scan", "-o", str(tmp_path / "images"))
+    (tiff,) = (tmp_path / "images").glob("*-rgb.tif")
+    with rasterio.open(tiff) as image:
+        bands = image.read()
+    with rasterio.open(next((tmp_path / "images").glob("*-offset.tif"))) as image:
+        np.testing.assert_array_equal(bands[3] > 0, np.isfinite(image.read(1)))
+    colours = np.concatenate([chunk.colour for chunk in read_chunks(real_scan("pump.e57"), None, colours=True)]) / 257.0
+    pixels = bands[:3, bands[3] > 0].T
+    np.testing.assert_allclose(pixels.mean(axis=0), colours.mean(axis=0), atol=12.0)
+    np.testing.assert_allclose(np.percentile(pixels, 90, axis=0), np.percentile(colours, 90, axis=0), atol=25.0)
 
 
 def test_the_pump_itself_has_faces_and_no_spot(tmp_path: Path) -> None:

@@ -18,9 +18,11 @@ import pypdf
 import pytest
 import rasterio
 from click.testing import CliRunner, Result
+from PIL import Image
 from psycopg import sql
 from psycopg.conninfo import make_conninfo
 from rasterio.errors import NotGeoreferencedWarning
+from support.coloured_image import ABOVE, BELOW, add_image_in_colour
 from support.example_survey import LEAKS, example_surface, thin_images, without_intensity
 from support.qgis import ENVIRONMENT, PYTHON, SCRIPT, act
 from support.system import missing
@@ -739,6 +741,22 @@ def test_offset_is_shown_where_there_is_no_intensity(conn: psycopg.Connection, e
     assert set(act(tmp_path / "demo.qgz", "describe")["themes"]["Unrolled"]) == {
         *UNROLLED, "demo-2024-km012-offset", "demo-2024-km012-offset-filled",
     } - NOT_AT_FIRST  # fmt: skip
+
+
+def test_the_image_in_colour_is_drawn_as_it_is(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:
+    """Also a colour with bands of 0, which is no missing value."""
+    add_image_in_colour(conn, "demo-2024")
+    assert write(tmp_path / "demo.qgz").exit_code == 0
+    seen = act(tmp_path / "demo.qgz", "describe")
+    assert "demo-2024-km012-rgb" not in seen["themes"]["Unrolled"]
+    for place, colour in ((2.0, ABOVE), (-2.0, BELOW)):
+        act(
+            tmp_path / "demo.qgz", "draw_layer", "demo-2024-km012-rgb", f"12350,{place - 0.5},12351,{place + 0.5}",
+            str(tmp_path / "r.png"),
+        )  # fmt: skip
+        drawn = np.asarray(Image.open(tmp_path / "r.png").convert("RGB")).reshape(-1, 3)
+        kinds, counts = np.unique(drawn, axis=0, return_counts=True)
+        assert kinds[counts.argmax()].tolist() == list(colour)
 
 
 @pytest.mark.parametrize("kind", ["offset", "corrected"])

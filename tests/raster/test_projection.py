@@ -177,7 +177,7 @@ def test_the_order_of_points_does_not_change_where_they_fall() -> None:
 def read(monkeypatch: pytest.MonkeyPatch, look: Observer, parts: list[list[Points]], pixel: float = 0.1) -> Accumulator:
     """Image of files, each a list of chunks."""
     files = {Path(f"{k}.laz"): chunks for k, chunks in enumerate(parts)}
-    monkeypatch.setattr(module, "read_chunks", lambda path, dimension, size, ranges, units: iter(files[path]))
+    monkeypatch.setattr(module, "read_chunks", lambda path, *_, **__: iter(files[path]))
     image = Accumulator(grid(pixel))
     sources = [ScanSource(path, [(0, sum(map(len, chunks)))], "Amplitude") for path, chunks in files.items()]
     rasterize(look, sources, image, ROUGHNESS, lambda share: None)

@@ -9,6 +9,7 @@ import psycopg
 import pytest
 from PIL import Image
 from starlette.testclient import TestClient
+from support.coloured_image import ABOVE, BELOW, add_image_in_colour
 from web.conftest import SignIn
 
 from tunneldb.raster.tiles import SIZE, Tile
@@ -105,3 +106,19 @@ def test_findings_as_vector_tiles(signed_in: SignIn, conn: psycopg.Connection, z
     info = pyogrio.read_info(answer.content)
     assert info["features"] >= 1
     assert {"kind", "review", "probability", "wet"} <= set(info["fields"])
+
+
+@pytest.mark.parametrize("zoom", [23, 18])
+def test_tiles_in_colour(signed_in: SignIn, conn: psycopg.Connection, zoom: int) -> None:
+    """A tile has the colours of the stored image; far away, those of its overview."""
+    add_image_in_colour(conn, "demo-2024")
+    browser = signed_in("viola_web")
+    kinds = browser.get("/api/surveys/demo-2024").json()["kinds"]
+    assert {"kind": "rgb", "label": "Colour", "unit": "", "signed": False} in kinds
+    assert browser.get("/api/surveys/demo-2024/colours/rgb").json() == {"low": 0, "high": 255}
+    for place, colour in ((2.0, ABOVE), (-2.0, BELOW)):
+        tile = tile_at(zoom, 12350.0, place)
+        image = picture(browser, "rgb", tile)
+        step = (tile.east - tile.west) / SIZE
+        row, column = int((tile.north - place) // step), int((12350.0 - tile.west) // step)
+        np.testing.assert_array_equal(image[row, column], [*colour, 255])

@@ -29,12 +29,13 @@ from tunneldb.store.survey import get_survey
 @click.option("--km", metavar="A-B", help="Only these kilometres: 12 or 12-14.")
 @click.pass_obj
 def image(settings: Settings, survey: str, output: Path, km: str | None) -> None:
-    """Write the unrolled images of SURVEY: raw and corrected intensity, offset from the surface, states, and classes.
+    """Write the unrolled images of SURVEY: raw and corrected intensity, offset from the surface, colour, states, and classes.
 
     For each kilometre and kind a Cloud Optimized GeoTIFF (dB, dB, m, and codes of states and classes with their
-    colours; x is the chainage, y the arc, m) and a PNG preview, with leaks outlined on the corrected one. In
-    previews, gaps between profiles up to 0.6 m apart are filled, except between states. A state is inspected or not,
-    lining or not, dark or not. Classes need stage ground.
+    colours; x is the chainage, y the arc, m) and a PNG preview, with leaks outlined on the corrected one. The image
+    in colour has red, green, blue and opacity; it exists if points have colours. In previews, gaps between profiles
+    up to 0.6 m apart are filled, except between states. A state is inspected or not, lining or not, dark or not.
+    Classes need stage ground.
     """
     with connect(settings.dsn) as conn:
         found = get_survey(conn, survey)

@@ -105,6 +105,8 @@ def _rows(look: FileLook) -> list[tuple[str, str]]:
         ("times", _times(look)),
         ("scans", _scans(look)),
     ]
+    if look.colours is not None:
+        rows.append(("colours", look.colours))
     return rows
 
 

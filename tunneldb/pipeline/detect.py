@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, cast
 
@@ -23,7 +23,7 @@ from tunneldb.anomalies.detectability.conditions import measure_conditions
 from tunneldb.anomalies.detectability.pieces import Pieces
 from tunneldb.anomalies.measure import Measurement, measure_outline
 from tunneldb.anomalies.sparse import least_density, leave_out_sparse
-from tunneldb.arrays import UInt8
+from tunneldb.arrays import Single, UInt8
 from tunneldb.errors import NotReadyError, UserError
 from tunneldb.finding_kind import FindingKind
 from tunneldb.geometry.section_outliers import MAX_GIRTH_SHARE, SectionOutliers
@@ -32,11 +32,13 @@ from tunneldb.geometry.surface import Surface
 from tunneldb.pipeline.calibration import UNKNOWN, Calibration, calibrate, dry_sigma
 from tunneldb.pipeline.detection_notes import describe, pixel_note
 from tunneldb.pipeline.replace_findings import replace_findings
+from tunneldb.pointcloud.colour_depth import colour_depth
 from tunneldb.pointcloud.points import Points
 from tunneldb.pointcloud.reader import ScanSource
 from tunneldb.radiometry.correction import Kind, needs_reference
 from tunneldb.radiometry.robust_statistics import DryLevel
 from tunneldb.raster.accumulator import Accumulator, Window
+from tunneldb.raster.colour_sums import ColourSums
 from tunneldb.raster.floor import MAX_HIDDEN_LENGTH, Floor
 from tunneldb.raster.geotiff import KINDS
 from tunneldb.raster.grid import Grid
@@ -69,6 +71,9 @@ from tunneldb.store.sonar import water_level
 from tunneldb.store.sources import sample, sources
 from tunneldb.store.surface import load_surface, survey_ends
 from tunneldb.store.survey import Survey
+
+SaveColours = Callable[[Grid, int, Single], None]
+"""Function that saves the colours of a block, given the pixels and the number of the block."""
 
 SURFACE_MARGIN = 50.0
 """Length of the surface loaded beyond the ends, m: sections are checked with the three before and after them."""
@@ -103,6 +108,8 @@ class DetectionInputs:
         Evidence model, with the tunnel's adjustments.
     drawn : list of Drawn
         Findings whose outlines people drew, to be measured.
+    colour_notes : tuple of str
+        Notes on the colours of the files.
     """
 
     survey: str
@@ -116,6 +123,7 @@ class DetectionInputs:
     network: Network | None
     judge: InForce
     drawn: list[Drawn]
+    colour_notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -176,7 +184,7 @@ def detect(
     inputs = load_inputs(conn, survey, km, values)
     if inputs.sample is None:
         images = ImageStore(conn, survey, ["offset"])
-        counts = make_offset_images(inputs, values, images.save, progress)
+        counts = make_offset_images(inputs, values, images.save, progress, images.save_colours)
         images.save_overviews(inputs.grid)
         drop_radiometry(conn, survey, km)
         drop_coverage(conn, survey, km)
@@ -189,10 +197,12 @@ def detect(
             "learned": inputs.judge.id,
             "pixels": images.pixels,
             "leaks": 0,
-            "note": "; ".join(["no intensity: offset image only, leaks not searched for", *pixel_note(counts)]),
+            "note": "; ".join(
+                ["no intensity: offset image only, leaks not searched for", *pixel_note(counts), *colour_notes(inputs, counts)]
+            ),
         }
     images = ImageStore(conn, survey, KINDS)
-    result = compute_detection(inputs, inputs.sample, values, images.save, progress)
+    result = compute_detection(inputs, inputs.sample, values, images.save, progress, images.save_colours)
     return _save(conn, survey, inputs, result, images, values)
 
 
@@ -206,7 +216,7 @@ def load_inputs(conn: psycopg.Connection[Any], survey: Survey, km: int, values: 
     """
     surface = load_surface(conn, survey, km * KILOMETRE - SURFACE_MARGIN, (km + 1) * KILOMETRE + SURFACE_MARGIN)
     grid = kilometre_grid(surface, km, values["image.pixel"] or SMALLEST)
-    files = sources(conn, survey, km)
+    files, notes = coloured_sources(sources(conn, survey, km))
     radiometer = load_radiometer(conn, survey, km, values)
     beyond = grid.halo * grid.pixel
     depth = values["lining.tolerance"], values["lining.recess"]
@@ -226,6 +236,7 @@ def load_inputs(conn: psycopg.Connection[Any], survey: Survey, km: int, values: 
         load_network(conn, int(values["detect.model"])),
         model_in_force(conn, survey.tunnel_id),
         load_drawn(conn, survey, km),
+        notes,
     )
 
 
@@ -235,6 +246,7 @@ def compute_detection(
     values: Mapping[str, float],
     save_block: Callable[[Grid, Window], None],
     progress: Callable[[float], None],
+    save_colours: SaveColours | None = None,
 ) -> DetectionResult:
     """Calibrate the intensity, make the images from the files, and find dark areas in them.
 
@@ -249,14 +261,17 @@ def compute_detection(
         Given the pixels, and each block of the images.
     progress : callable
         Given the share of the points that were read.
+    save_colours : callable or None
+        Given the pixels, and number and colours of each block, after the block itself; only if files have colours.
     """
     calibration = calibrate(sample, inputs.observer, inputs.homogeneous, inputs.survey, own_curve=inputs.own_curve)
     observer, view, roughness = calibration.observer, calibration.view, calibration.roughness
     with ExitStack() as stack:
-        image, gaps, counts = _gather(observer, inputs, values, roughness.sigma, progress, stack)
+        image, gaps, colours, counts = _gather(observer, inputs, values, roughness.sigma, progress, stack)
         outliers = SectionOutliers.of(observer.surface, MAX_GIRTH_SHARE)
         grid = image.grid
         lining = lining_image(image, gaps, observer, outliers, values["appendage.distance"], partial(save_block, grid))
+        _keep_colours(image, gaps, colours, save_colours)
     if gaps is not None:
         counts["profile_spacing"] = round(gaps.spacing, 3)
     density = least_density(values["image.min_density"], grid.pixel)
@@ -294,14 +309,25 @@ def make_offset_images(
     values: Mapping[str, float],
     save_block: Callable[[Grid, Window], None],
     progress: Callable[[float], None],
+    save_colours: SaveColours | None = None,
 ) -> Counts:
-    """Make the offset image of a survey without intensity."""
+    """Make the offset image of a survey without intensity, and the image in colour if files have colours."""
     with ExitStack() as stack:
-        image, _, counts = _gather(inputs.observer, inputs, values, 0.0, progress, stack)
+        image, _, colours, counts = _gather(inputs.observer, inputs, values, 0.0, progress, stack)
         width = image.grid.block_columns
         for block in image.inner_blocks():
             save_block(image.grid, image.window(block * width, (block + 1) * width))
+        _keep_colours(image, None, colours, save_colours)
     return counts
+
+
+def _keep_colours(image: Accumulator, gaps: ProfileGaps | None, colours: ColourSums | None, save: SaveColours | None) -> None:
+    """Save the colours of the blocks of the kilometre itself."""
+    if colours is not None and save is not None:
+        inner = set(image.inner_blocks())
+        for block in colours.inner_blocks():
+            if block in inner:
+                save(image.grid, block, colours.rgb(block, gaps))
 
 
 def _save(
@@ -326,7 +352,13 @@ def _save(
     if result.background.count:
         save_measured(conn, inputs.drawn, result.drawn)
     network = usable(inputs.network, result.grid.pixel)
-    notes = [survey.note, inputs.judge.note, result.calibration.note, detectability_statement(conn, survey, km)]
+    notes = [
+        *colour_notes(inputs, result.counts),
+        survey.note,
+        inputs.judge.note,
+        result.calibration.note,
+        detectability_statement(conn, survey, km),
+    ]
     return {
         **result.counts,
         "model": inputs.judge.model.version,
@@ -395,13 +427,17 @@ def _gather(
     roughness: float,
     progress: Callable[[float], None],
     stack: ExitStack,
-) -> tuple[Accumulator, ProfileGaps | None, Counts]:
+) -> tuple[Accumulator, ProfileGaps | None, ColourSums | None, Counts]:
     """Read the files into an image, which must not show the halo alone, and find the gaps between its profiles.
+
+    If files have colours, they are read into a second image of the same pixels.
 
     Its pixels are enlarged where points are few, unless profiles are apart: between them the nearest one is shown.
     """
     image = stack.enter_context(Accumulator(inputs.grid))
-    counts = rasterize(observer, inputs.files, image, roughness, progress)
+    coloured = any(file.full_colour for file in inputs.files)
+    colours = stack.enter_context(ColourSums(inputs.grid)) if coloured else None
+    counts = rasterize(observer, inputs.files, image, roughness, progress, colours)
     if not image.inner_blocks():
         raise UserError(
             f"no point of {', '.join(file.path.name for file in inputs.files)} is on the lining of kilometre {observer.km}"
@@ -413,9 +449,27 @@ def _gather(
             large = stack.enter_context(Accumulator(coarse_grid(image.grid, factor, halo(factor * image.grid.pixel))))
             coarsen(image, large)
             image = large
+            if colours is not None:
+                large_colours = stack.enter_context(ColourSums(large.grid))
+                coarsen(colours, large_colours)
+                colours = large_colours
             counts["density"] = round(density)
     counts["pixel"] = image.grid.pixel
-    return image, gaps, counts
+    return image, gaps, colours, counts
+
+
+def coloured_sources(files: list[ScanSource]) -> tuple[list[ScanSource], tuple[str, ...]]:
+    """Return the files with the value of full colour of those that have colours, and notes on it."""
+    depths = [colour_depth(file.path) for file in files]
+    pairs = [(file, depth) for file, depth in zip(files, depths, strict=True) if depth is not None]
+    notes = filter(None, (depth.note(file.path) for file, depth in pairs))
+    full = [0 if depth is None else depth.maximum for depth in depths]
+    return [replace(file, full_colour=value) for file, value in zip(files, full, strict=True)], tuple(notes)
+
+
+def colour_notes(inputs: DetectionInputs, counts: Counts) -> list[str]:
+    """Return the notes on the colours of the files."""
+    return [*inputs.colour_notes, *counts.get("colours_cut", ())]
 
 
 def kilometre_grid(surface: Surface, km: int, pixel: float) -> Grid:

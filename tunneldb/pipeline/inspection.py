@@ -17,6 +17,7 @@ from tunneldb.geometry.crs_equality import epsg_code, horizontal
 from tunneldb.geometry.units import Units
 from tunneldb.pipeline.inspected_axis import doubt_axis
 from tunneldb.pipeline.inspected_poses import doubt_poses, file_beside
+from tunneldb.pointcloud.colour_depth import colour_depth
 from tunneldb.pointcloud.contents import Contents, read_contents, read_near, read_values
 from tunneldb.pointcloud.form import WINDOW, TunnelForm, profile_spacing, surface_density, tunnel_form
 from tunneldb.pointcloud.formats.las import read_las_facts
@@ -142,6 +143,8 @@ class FileLook:
         Why the trajectory or the stations beside the file, or the positions of its scans, do not fit the points.
     axis_doubt : str or None
         Why the axis beside the file does not fit the points.
+    colours : str or None
+        Bits of the colours of its points; None if they have none.
     header_note : str or None
         Difference between its header and its points.
     only_noise : bool
@@ -183,6 +186,7 @@ class FileLook:
     time_offset: float | None = None
     pose_doubt: str | None = None
     axis_doubt: str | None = None
+    colours: str | None = None
 
     @property
     def other_than_a_tunnel(self) -> str | None:
@@ -223,6 +227,7 @@ def inspect_file(path: Path, begin: StartProgress, given: GivenUnits = NOT_GIVEN
     unit, unit_options = _unit_doubt(header, contents, form)
     axis = file_beside([path], "axis.csv")
     time_offset, pose_doubt = doubt_poses(path, contents, form, poses)
+    depth = colour_depth(path)
     return FileLook(
         path,
         kind,
@@ -259,6 +264,7 @@ def inspect_file(path: Path, begin: StartProgress, given: GivenUnits = NOT_GIVEN
         time_offset,
         pose_doubt,
         None if axis is None else doubt_axis(axis, contents.xyz),
+        None if depth is None else str(depth),
     )
 
 

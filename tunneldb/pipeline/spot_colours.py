@@ -9,12 +9,10 @@ import numpy as np
 
 from tunneldb.arrays import Float, Int64
 from tunneldb.pipeline.members import FileMembers, Inputs, find_members, read_all
+from tunneldb.pointcloud.colour_depth import EIGHT_BITS
 from tunneldb.pointcloud.formats.table import has_colours
 from tunneldb.pointcloud.reader import read_header
 from tunneldb.progress import StartProgress
-
-EIGHT_BITS = 255
-"""Maximum value of 8-bit colours, which some files have although LAS has 16 bits."""
 
 
 def find_coloured_members(inputs: Inputs, begin: StartProgress) -> FileMembers:

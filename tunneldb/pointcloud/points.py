@@ -21,8 +21,21 @@ Ranges = Sequence[tuple[int, int]]
 """Half-open ranges of point indices, from 0, in the order of reading."""
 
 
+COLOURS = ("red", "green", "blue")
+"""Names of the dimensions with the colour of a point."""
+
+MAX_COLOUR = 65535
+"""Greatest red, green or blue of 16 bits."""
+
 MAX_COORDINATE = 1e11
 """Greatest plausible coordinate; projected systems have smaller ones, even in millimetres."""
+
+
+def colours_of(values: NDArray[Any]) -> UInt16:
+    """Return colours from numbers (n, 3) of a file; black, for no colour, where one is no whole number of 16 bits."""
+    with np.errstate(invalid="ignore"):
+        usable = ((values >= 0) & (values <= MAX_COLOUR) & (values == np.floor(values))).all(axis=1)
+    return np.where(usable[:, None], values, 0).astype(np.uint16)
 
 
 def on_earth(values: Float) -> Bool:

@@ -157,12 +157,15 @@ class ScanSource:
         The survey's intensity dimension.
     units : Units
         Units of the file's coordinates.
+    full_colour : int
+        Value of full red, green or blue; 0 to read no colours.
     """
 
     path: Path
     ranges: list[tuple[int, int]]
     dimension: str | None
     units: Units = IN_METRES
+    full_colour: int = 0
 
     @property
     def points(self) -> int:

@@ -21,8 +21,8 @@ FILL_NOTE = f"gaps up to {2 * MAX_FILL_DISTANCE:g} m filled"
 
 
 def fill_gaps(values: Single, reach: float) -> Single:
-    """Fill pixels without a value, NaN, with that of the nearest one within ``reach`` pixels."""
-    empty = np.isnan(values)
+    """Fill pixels without a value or colour, NaN, with that of the nearest one within ``reach`` pixels."""
+    empty = np.isnan(values if values.ndim == 2 else values[:, :, 0])
     if empty.all() or not empty.any():
         return values
     distance, (row, column) = ndimage.distance_transform_edt(empty, return_indices=True)

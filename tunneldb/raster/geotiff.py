@@ -13,7 +13,7 @@ from affine import Affine
 from rasterio.errors import NotGeoreferencedWarning, RasterioIOError
 from rasterio.io import MemoryFile
 
-from tunneldb.arrays import Float, Int16, Single
+from tunneldb.arrays import Float, Int16, Single, UInt8
 from tunneldb.compiled import kernel
 from tunneldb.errors import UserError
 
@@ -30,6 +30,9 @@ DEVIATION_KINDS = {
 CHANGE = "change"
 """Image of the change (m) since an older survey, positive inwards, if two surveys were compared."""
 
+RGB = "rgb"
+"""Image in colour, red, green and blue from 0 to 255, if the points have colours."""
+
 STEP = {
     "raw": 0.01, "corrected": 0.01, "offset": 0.001, "state": 1.0, CHANGE: 1e-4, "lod": 1e-4,
     **dict.fromkeys(DEVIATION_KINDS.values(), 0.001),
@@ -37,7 +40,7 @@ STEP = {
 """Size of one stored step: dB, dB, m; of the state of pixels itself, m."""
 
 UNIT = {
-    "raw": "dB", "corrected": "dB", "offset": "m", "state": "", CHANGE: "m", "lod": "m",
+    "raw": "dB", "corrected": "dB", "offset": "m", "state": "", RGB: "", CHANGE: "m", "lod": "m",
     **dict.fromkeys(DEVIATION_KINDS.values(), "m"),
 }  # fmt: skip
 
@@ -51,7 +54,7 @@ class Raster:
     Attributes
     ----------
     values : (rows, columns) float32 array
-        dB or m.
+        dB or m. Of an image in colour: (rows, columns, 3), 0 to 255.
     transform : Affine
         From (column, row) to (chainage, arc), m.
     """
@@ -61,7 +64,7 @@ class Raster:
 
     def places(self) -> tuple[Float, Float]:
         """Return the chainage of the columns and the arc of the rows, middles, m."""
-        rows, columns = self.values.shape
+        rows, columns = self.values.shape[:2]
         place = self.transform
         chainage = np.asarray(place.c + (np.arange(columns) + 0.5) * place.a, dtype=np.float64)
         return chainage, np.asarray(place.f + (np.arange(rows) + 0.5) * place.e, dtype=np.float64)
@@ -75,10 +78,12 @@ def whole(values: Single, kind: str) -> Int16:
 
 
 def encode(raster: Raster, kind: str) -> bytes:
-    """Write an image as a GeoTIFF of 16-bit whole numbers, with its scale, unit and nodata value.
+    """Write an image as a GeoTIFF of 16-bit whole numbers, with its scale, unit and nodata value; one in colour in 8 bits.
 
     The lowest bits are measured noise: fast compression is as good as slow, and differences of neighbours help.
     """
+    if kind == RGB:
+        return _encode_colours(raster)
     rows, columns = raster.values.shape
     profile: dict[str, Any] = {
         "driver": "GTiff",
@@ -102,19 +107,60 @@ def encode(raster: Raster, kind: str) -> bytes:
         return bytes(memory.read())
 
 
-def decode(tiff: bytes) -> Raster:
+def _encode_colours(raster: Raster) -> bytes:
+    """Write an image in colour as a GeoTIFF of three bands, black without a colour."""
+    rows, columns, bands = raster.values.shape
+    profile: dict[str, Any] = {
+        "driver": "GTiff",
+        "height": rows,
+        "width": columns,
+        "count": bands,
+        "dtype": "uint8",
+        "transform": raster.transform,
+        "photometric": "RGB",
+        "compress": "zstd",
+        "zstd_level": 1,
+        "predictor": 2,
+        "interleave": "pixel",
+        "tiled": True,
+        "blockxsize": 256,
+        "blockysize": 256,
+    }
+    with MemoryFile() as memory:
+        with memory.open(**profile) as image:
+            image.write(whole_colours(raster.values))
+        return bytes(memory.read())
+
+
+def whole_colours(values: Single) -> UInt8:
+    """Convert colours (rows, columns, 3) to 8 bits (3, rows, columns): black for NaN, the darkest blue for a measured black."""
+    rows, columns, bands = values.shape
+    whole: UInt8 = np.empty((bands, rows, columns), np.uint8)
+    _whole_colours(np.ascontiguousarray(values), whole)
+    return whole
+
+
+def decode(tiff: bytes, kind: str = "") -> Raster:
     """Read an image that :func:`encode` wrote.
+
+    An image in colour is read only if its kind, or that of its overview, is given.
 
     Bytes of other origin, for example from an archive, are read as GeoTIFF only: a VRT could make GDAL read other files.
 
     Raises
     ------
     UserError
-        If it is not a GeoTIFF.
+        If it is not a GeoTIFF, or has other bands than its kind.
     """
     with warnings.catch_warnings(), _told():
         warnings.simplefilter("ignore", NotGeoreferencedWarning)
         with MemoryFile(tiff) as memory, memory.open(driver="GTiff") as image:
+            coloured = kind.endswith(RGB)
+            if image.count != (3 if coloured else 1):
+                raise UserError(f"an image in the database has {image.count} bands; run stage detect again")
+            if coloured:
+                bands = np.moveaxis(image.read((1, 2, 3)), 0, 2)
+                return Raster(np.where(bands.any(axis=2, keepdims=True), bands, np.float32(np.nan)), image.transform)
             steps = image.read(1)
             values = np.empty(steps.shape, np.float32)
             np.multiply(steps, image.scales[0], out=values, casting="same_kind")  # no array of doubles
@@ -133,10 +179,24 @@ def _told() -> Iterator[None]:
 def laid(raster: Raster, like: Raster) -> Single:
     """Return the values of a block in the rows of another one with the same pixels."""
     down = round((like.transform.f - raster.transform.f) / like.transform.a)
-    values = np.full((len(like.values), raster.values.shape[1]), np.nan, np.float32)
+    values = np.full((len(like.values), *raster.values.shape[1:]), np.nan, np.float32)
     rows = slice(max(down, 0), min(down + len(raster.values), len(values)))
     values[rows] = raster.values[rows.start - down : rows.stop - down]
     return values
+
+
+@kernel
+def _whole_colours(values: Single, whole: UInt8) -> None:  # pragma: no cover - compiled
+    for i in range(values.shape[0]):
+        for j in range(values.shape[1]):
+            present = not np.isnan(values[i, j, 0])
+            black = True
+            for band in range(3):
+                value = np.uint8(np.rint(values[i, j, band])) if present else np.uint8(0)
+                whole[band, i, j] = value
+                black = black and value == 0
+            if present and black:
+                whole[2, i, j] = 1
 
 
 @kernel

@@ -17,7 +17,12 @@ PREFIX = "overview_"
 
 
 def shrink(values: Single, factor: int) -> Single:
-    """Average blocks of ``factor`` × ``factor`` pixels, passing over NaNs; the image is filled up to whole blocks."""
+    """Average blocks of ``factor`` × ``factor`` pixels, passing over NaNs; the image is filled up to whole blocks.
+
+    Of an image in colour (rows, columns, 3) each band is averaged.
+    """
+    if values.ndim == 3:
+        return np.dstack([shrink(values[:, :, band], factor) for band in range(values.shape[2])])
     rows, columns = (-(-n // factor) * factor for n in values.shape)
     padded = np.full((rows, columns), np.nan, np.float32)
     padded[: values.shape[0], : values.shape[1]] = values
@@ -89,7 +94,8 @@ class Overview:
         first, last = self._parts[0], self._parts[-1]
         pixel = first.transform.a
         columns = [round((part.transform.c - first.transform.c) / pixel) for part in self._parts]
-        values = np.full((first.values.shape[0], columns[-1] + last.values.shape[1]), np.nan, np.float32)
+        rows, width, *bands = last.values.shape
+        values = np.full((rows, columns[-1] + width, *bands), np.nan, np.float32)
         for column, part in zip(columns, self._parts, strict=True):
             values[:, column : column + part.values.shape[1]] = part.values
         return Raster(values, first.transform)

@@ -10,6 +10,7 @@ import numpy as np
 
 from tunneldb.arrays import Bool, Float
 from tunneldb.raster.accumulator import Accumulator
+from tunneldb.raster.block_sums import BlockSums
 from tunneldb.raster.grid import Grid
 
 SMALLEST = 0.02
@@ -57,7 +58,7 @@ def coarse_grid(grid: Grid, factor: int, halo: int) -> Grid:
     return Grid(grid.km, grid.pixel * factor, bottom, top - bottom, halo, grid.covered)
 
 
-def coarsen(image: Accumulator, large: Accumulator) -> None:
+def coarsen(image: BlockSums, large: BlockSums) -> None:
     """Add the sums of an image to those of an empty one of the same blocks, with larger pixels."""
     factor = round(large.grid.pixel / image.grid.pixel)
     first = (large.grid.bottom + large.grid.rows) * factor - image.grid.bottom - image.grid.rows

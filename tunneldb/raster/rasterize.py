@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from tunneldb.errors import UserError
 from tunneldb.pointcloud.reader import Points, ScanSource, read_chunks
 from tunneldb.radiometry.oren_nayar import incidence_db
 from tunneldb.raster.accumulator import Accumulator
+from tunneldb.raster.colour_sums import ColourSums
 from tunneldb.raster.grid import Grid
 from tunneldb.raster.observation import Observer, RangeSpan
 from tunneldb.raster.projection import (
@@ -34,7 +36,12 @@ CHUNK = 50_000
 
 
 def rasterize(
-    observer: Observer, files: list[ScanSource], image: Accumulator, roughness: float, progress: Callable[[float], None]
+    observer: Observer,
+    files: list[ScanSource],
+    image: Accumulator,
+    roughness: float,
+    progress: Callable[[float], None],
+    colours: ColourSums | None = None,
 ) -> Counts:
     """Read the files and add their points to the image.
 
@@ -50,6 +57,8 @@ def rasterize(
         Roughness of the lining, degrees.
     progress : callable
         Called with the completed share, 0 to 0.9.
+    colours : ColourSums or None
+        Image that receives the colours of the points, in the same grid; None to read no colours.
 
     Raises
     ------
@@ -59,9 +68,13 @@ def rasterize(
     total, read, used, lost = sum(file.points for file in files), 0, 0, 0
     span = RangeSpan()
     projector = Projector.of(observer, image.grid, roughness)
-    for points in _chunks(files):
+    brightest: dict[Path, int] = {}
+    for file, points in _chunks(files, colours is not None):
         pixels, tally = projector.project(points)
         image.add(pixels, len(points))
+        if colours is not None and points.colour is not None:
+            colours.add(pixels, points.colour, file.full_colour)
+            brightest[file.path] = max(brightest.get(file.path, 0), int(points.colour.max(initial=0)))
         span.add(tally.nearest, tally.farthest, tally.outside, tally.lining)
         read += len(points)
         used += tally.used
@@ -80,13 +93,26 @@ def rasterize(
         "points_used": used,
         **({"points_unposed": lost} if lost else {}),
         **({"points_outside_curve": span.outside} if span.outside else {}),
+        **({"colours_cut": cut} if (cut := _cut(files, brightest)) else {}),
     }
 
 
-def _chunks(files: list[ScanSource]) -> Iterator[Points]:
+def _cut(files: list[ScanSource], brightest: Mapping[Path, int]) -> list[str]:
+    """Return notes on the files with colours brighter than full colour."""
+    return [
+        f"{file.path.name}: colours up to {brightest[file.path]} are shown as {file.full_colour}, because a sample of the file"
+        " has 8 bits"
+        for file in files
+        if brightest.get(file.path, 0) > file.full_colour
+    ]
+
+
+def _chunks(files: list[ScanSource], colours: bool) -> Iterator[tuple[ScanSource, Points]]:
     size = CHUNK if threads() == 1 else 4 * CHUNK * threads()  # so that each thread has chunks to decode
     for file in files:
-        yield from read_chunks(file.path, file.dimension, size, file.ranges, units=file.units)
+        coloured = colours and file.full_colour > 0
+        for points in read_chunks(file.path, file.dimension, size, file.ranges, units=file.units, colours=coloured):
+            yield file, points
 
 
 @dataclass

@@ -99,12 +99,14 @@ def sample(tile: Tile, images: list[Raster], margin: int = 0) -> Single:
     Returns
     -------
     (256 + 2 margin, 256 + 2 margin) float32 array
+        With a third dimension for images in colour.
     """
     middle: Float = np.asarray((np.arange(-margin, SIZE + margin) + 0.5) * tile.pixel, np.float64)
     chainage, arc = tile.west + middle, tile.north - middle
-    out = np.full((len(middle), len(middle)), np.nan, np.float32)
+    bands = images[0].values.shape[2:] if images else ()
+    out = np.full((len(middle), len(middle), *bands), np.nan, np.float32)
     for image in images:
-        rows, columns = image.values.shape
+        rows, columns = image.values.shape[:2]
         column = np.floor((chainage - image.transform.c) / image.transform.a).astype(np.int64)
         row = np.floor((image.transform.f - arc) / image.transform.a).astype(np.int64)
         across, along = (row >= 0) & (row < rows), (column >= 0) & (column < columns)

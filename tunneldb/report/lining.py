@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 from collections import OrderedDict
+from collections.abc import Sequence
 from dataclasses import astuple, dataclass
 from typing import Any, Literal
 
@@ -17,10 +18,11 @@ from tunneldb.anomalies.threshold import filter_size, seen_lining
 from tunneldb.anomalies.windows import on_lining
 from tunneldb.arrays import Bool, Intp, Single, UInt8
 from tunneldb.raster.gap_fill import MAX_FILL_DISTANCE, fill_gaps
-from tunneldb.raster.geotiff import Raster, decode
+from tunneldb.raster.geotiff import RGB, Raster, decode
 from tunneldb.raster.grey import grey_range
 from tunneldb.raster.grid import BLOCK
 from tunneldb.raster.state import PixelState
+from tunneldb.store.images import load_block
 from tunneldb.store.survey import Survey
 
 Form = Literal["WEBP", "JPEG"]
@@ -34,6 +36,9 @@ NO_STATE = 255
 
 FILLED = 0.14
 """Width of the square around a pixel without points whose mean it takes, m: about that of the median filter."""
+
+CACHED_COLOURS = 2
+"""Number of blocks in colour in memory: those of one leak."""
 
 MIN_OFFSET_RANGE = 0.005
 """Minimum range of offsets from black to white, m."""
@@ -73,9 +78,10 @@ class Window:
 
 @dataclass(frozen=True)
 class Picture:
-    """Picture of a window: a file of an image."""
+    """Picture of a window, with pixels of a side, m: a file of an image."""
 
     window: Window
+    side: float
     form: Form
     content: bytes
 
@@ -149,14 +155,18 @@ class Lining:
         self._kept: OrderedDict[int, _Block] = OrderedDict()
         self._known: dict[int, _Kilometre] = {}
         self._unseen: OrderedDict[int, Bool] = OrderedDict()
+        coloured = conn.execute(
+            "SELECT DISTINCT block FROM tunnel.image WHERE survey_id = %s AND kind = %s", [survey.id, RGB]
+        ).fetchall()
+        self._coloured: set[int] = {block for (block,) in coloured}
+        self._colours: OrderedDict[int, Raster] = OrderedDict()
 
     def picture(self, window: Window, pixel: float) -> Picture | None:
         """Draw a window; return None without an image.
 
         A pixel of the picture is about so large, m: a whole number of the image's own, which bounds the window anew.
         """
-        numbers = range(int(np.floor(window.west / BLOCK)), int(np.ceil(window.east / BLOCK)))
-        there = {number: self._kilometre(self._km[number]) for number in numbers if number in self._km}
+        there = {number: self._kilometre(self._km[number]) for number in _blocks(window) if number in self._km}
         if not there:
             return None
         native = max(kilometre.pixel for kilometre in there.values())
@@ -168,16 +178,49 @@ class Lining:
             place = _Place.of(self._block(number), self._hidden(number, kilometre.size), window, side)
             if place is not None:
                 canvas[place.there] = _seen(place, side, kilometre) if offset is None else _grey(offset[place.there], kilometre)
+        return self._written(canvas, window, side)
+
+    def colours(self, like: Picture) -> Picture | None:
+        """Draw the window of a picture in colour; return None without colours."""
+        window, pixel = like.window, like.side
+        there = [number for number in _blocks(window) if number in self._coloured]
+        shape = round(window.height / pixel), round(window.width / pixel)
+        sums = np.zeros((4, *shape), np.float32)
+        for number in there:
+            raster = self._rgb(number)
+            unused = np.zeros(raster.values.shape[:2], np.uint8)
+            place = _Place.of(_Block(raster, unused), unused.view(np.bool_), window, pixel)
+            if place is not None:
+                known = np.isfinite(place.values[:, :, 0])
+                bands = (np.where(known, place.values[:, :, band], np.float32(0.0)) for band in range(3))
+                sums[:, *place.there] += _sums((known, *bands), place.row, place.column)
+        if not sums[0].any():
+            return None
+        means = np.dstack([_ratio(part, sums[0]) for part in sums[1:]])
+        filled = fill_gaps(means, FILLED / pixel)
+        canvas = np.where(np.isnan(filled), np.array(NOTHING, np.float32), filled).astype(np.uint8)
+        return self._written(canvas, window, pixel)
+
+    def _rgb(self, number: int) -> Raster:
+        """Read a block in colour; the last two are kept."""
+        if number not in self._colours:
+            self._colours[number] = load_block(self._conn, self._survey, self._km[number], RGB, number)
+            while len(self._colours) > CACHED_COLOURS:
+                self._colours.popitem(last=False)
+        self._colours.move_to_end(number)
+        return self._colours[number]
+
+    def _written(self, canvas: UInt8, window: Window, side: float) -> Picture:
         out = io.BytesIO()
         Image.fromarray(canvas).save(out, self._form, quality=QUALITY[self._form])
-        return Picture(window, self._form, out.getvalue())
+        return Picture(window, side, self._form, out.getvalue())
 
     def _offset(self, window: Window, side: float) -> Single:
         """Return the offset of a window, m, NaN for none, with gaps filled from its surroundings."""
         edge = int(np.ceil(MAX_FILL_DISTANCE / side))
         about = Window(*(end + way * edge * side for end, way in zip(astuple(window), (-1, 1, -1, 1), strict=True)))
         sums = np.zeros((2, round(about.height / side), round(about.width / side)), np.float32)
-        for number in range(int(np.floor(about.west / BLOCK)), int(np.ceil(about.east / BLOCK))):
+        for number in _blocks(about):
             if number not in self._km:
                 continue
             block = self._block(number)
@@ -257,7 +300,7 @@ class _Place:
     @classmethod
     def of(cls, block: _Block, hidden: Bool, window: Window, side: float) -> _Place | None:
         """Find the place of a block in a window with pixels of that side, m; None if it has none."""
-        transform, (height, width) = block.shown.transform, block.shown.values.shape
+        transform, (height, width) = block.shown.transform, block.shown.values.shape[:2]
         column = np.floor((transform.c + transform.a * (np.arange(width) + 0.5) - window.west) / side).astype(np.intp)
         row = np.floor((window.north - transform.f - transform.e * (np.arange(height) + 0.5)) / side).astype(np.intp)
         part = _inside(row, round(window.height / side)), _inside(column, round(window.width / side))
@@ -270,6 +313,11 @@ class _Place:
     def sums(self) -> Single:
         """Sum up the block's pixels, see :func:`_accumulate`."""
         return _accumulate(self.values, self.state, self.hidden, self.row, self.column)
+
+
+def _blocks(window: Window) -> range:
+    """Return the numbers of the blocks that a window touches."""
+    return range(int(np.floor(window.west / BLOCK)), int(np.ceil(window.east / BLOCK)))
 
 
 def _inside(place: Intp, count: int) -> slice:
@@ -319,7 +367,11 @@ def _accumulate(values: Single, state: UInt8, hidden: Bool, row: Intp, column: I
     floor = (state == PixelState.FLOOR) | (state == PixelState.SUBMERGED) | (state == NO_STATE)
     off = state == PixelState.OFF
     known = np.isfinite(values)
-    layers = (known, np.where(known, values, 0.0), ~(floor | off), hidden, off, floor)
+    return _sums((known, np.where(known, values, 0.0), ~(floor | off), hidden, off, floor), row, column)
+
+
+def _sums(layers: Sequence[Bool | Single], row: Intp, column: Intp) -> Single:
+    """Sum up the pixels of layers (rows, columns) that fall into each coarser one."""
     first = [np.flatnonzero(np.diff(place, prepend=-1)) for place in (row, column)]
     sums = np.empty((len(layers), len(first[0]), len(first[1])), np.float32)
     for k, layer in enumerate(layers):

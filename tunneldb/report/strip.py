@@ -222,6 +222,9 @@ class Strips:
             }
             if picture is not None:
                 detail["picture"] = picture.url
+                colour = lining.colours(picture)
+                if colour is not None:
+                    detail["colour"] = colour.url
             if sections:
                 chainage, section = min(sections, key=lambda known: abs(known[0] - leak.middle))
                 detail |= {

@@ -21,7 +21,7 @@ from tunneldb.radiometry.reference_curve import ReferenceCurve
 from tunneldb.radiometry.robust_statistics import DryLevel
 from tunneldb.radiometry.roughness import Roughness
 from tunneldb.raster.accumulator import Window
-from tunneldb.raster.geotiff import Raster, decode, encode
+from tunneldb.raster.geotiff import RGB, Raster, decode, encode
 from tunneldb.raster.grid import BLOCKS, Grid
 from tunneldb.raster.overview import PREFIX, Overview
 from tunneldb.raster.state import PixelState
@@ -65,7 +65,7 @@ def load_kinds(conn: psycopg.Connection[Any], survey: Survey, km: int, block: in
         (survey.id, km, block, list(kinds)),
         binary=True,
     ).fetchall()
-    return {kind: decode(tiff) for kind, tiff in rows}
+    return {kind: decode(tiff, kind) for kind, tiff in rows}
 
 
 def load_regions(conn: psycopg.Connection[Any], survey: Survey, km: int, kind: str) -> list[Polygon]:
@@ -117,6 +117,14 @@ class ImageStore:
         self._blocks.append(block)
         for kind in self.kinds:
             self._insert(grid, kind, block, Raster(_values(window, kind), grid.transform(columns.start)))
+
+    def save_colours(self, grid: Grid, block: int, colours: Single) -> None:
+        """Save the colours (rows, columns of a block, 3) of a block of a grid, counted from 0, that was saved before."""
+        if not np.isfinite(colours).any():
+            return
+        self._overviews.setdefault(RGB, Overview(RGB))
+        place = grid.transform(block * grid.block_columns)
+        self._insert(grid, RGB, grid.first_block + block, Raster(colours, place))
 
     def save_states(self, grid: Grid, state: UInt8, dark: Bool) -> None:
         """Save the states of the pixels (rows, columns) of the kilometre, in blocks saved before; ``DARK`` for dark ones."""

@@ -9,7 +9,8 @@ import numpy as np
 
 from tunneldb.export.images.preview import OFFSET_SPANS
 from tunneldb.export.images.tile_png import Stretch, is_signed
-from tunneldb.raster.geotiff import Raster
+from tunneldb.raster.colour_sums import FULL
+from tunneldb.raster.geotiff import RGB, Raster
 from tunneldb.raster.grid import BLOCK, BLOCKS
 from tunneldb.raster.overview import PIXEL
 from tunneldb.raster.tiles import Tile, reduce
@@ -69,6 +70,8 @@ def _kept(cache: BlockCache, keys: Mapping[int, Hashable]) -> dict[int, Raster]:
 
 def survey_stretch(cache: BlockCache, conn: Connection, survey: Place, kind: str) -> Stretch:
     """Return the values of the darkest and the brightest colour of a survey's image, from its overviews."""
+    if kind == RGB:
+        return Stretch(0.0, FULL)
     whole = (int(np.floor((survey.low or 0.0) / BLOCK)) - BLOCKS, int(np.ceil((survey.high or 0.0) / BLOCK)))
     images, tag = _images(cache, conn, survey.id, kind, overview_of(kind), whole, PIXEL)
     known = cache.stretches.get(tag)

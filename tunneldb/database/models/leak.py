@@ -207,6 +207,7 @@ class Image(Base):
                     "raw",
                     "corrected",
                     "offset",
+                    "rgb",
                     "state",
                     "deviation_lining",
                     "deviation_shotcrete",
@@ -224,8 +225,8 @@ class Image(Base):
     km: Mapped[int] = mapped_column(primary_key=True, autoincrement=False, comment=KM)
     kind: Mapped[str] = mapped_column(
         primary_key=True,
-        comment="raw or corrected intensity, dB, offset from the surface, m, state of the pixel, or deviation from the design "
-        "profiles of a layer, m; overview_KIND: the same of a whole kilometre, with pixels of about 0.4 m",
+        comment="raw or corrected intensity, dB, offset from the surface, m, colour (rgb), state of the pixel, or deviation "
+        "from the design profiles of a layer, m; overview_KIND: the same of a whole kilometre, with pixels of about 0.4 m",
     )
     block: Mapped[int] = mapped_column(
         primary_key=True,

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from rasterio.windows import Window
 
 from tunneldb.export.images.palette import PALETTES
-from tunneldb.raster.geotiff import UNIT
+from tunneldb.pointcloud.points import COLOURS
+from tunneldb.raster.geotiff import RGB, UNIT
 
 
 @dataclass(frozen=True)
@@ -44,29 +45,38 @@ def write_cog(path: Path, kind: str, extent: Extent, blocks: Iterable[tuple[int,
         File to write.
     kind : str
         Intensities and offset are written in single precision, NaN for nothing; classes and states in 8 bits with a
-        colour table.
+        colour table; colours in 8 bits with opacity.
     extent : Extent
         Place and size of the image.
     blocks : iterable of (int, (rows, columns) array)
-        First column and pixels of each block.
+        First column and pixels of each block; (rows, columns, 4) for colours.
     name : str
         Name of the band, if not its kind.
     """
     plain = path.with_name(f"plain-{path.name}")
     palette = PALETTES.get(kind)
+    if kind == RGB:
+        nodata, bands, options = None, 4, {"photometric": "RGB", "alpha": "YES", "interleave": "pixel"}
+    else:
+        nodata, bands, options = palette.nodata if palette else np.nan, 1, {}
     with rasterio.open(
-        plain, "w", driver="GTiff", height=extent.rows, width=extent.columns, count=1, transform=extent.transform,
-        dtype="uint8" if palette else "float32", nodata=palette.nodata if palette else np.nan,
-        tiled=True, blockxsize=256, blockysize=256, bigtiff="if_safer",
+        plain, "w", driver="GTiff", height=extent.rows, width=extent.columns, count=bands, transform=extent.transform,
+        dtype="uint8" if palette or kind == RGB else "float32", nodata=nodata,
+        tiled=True, blockxsize=256, blockysize=256, bigtiff="if_safer", **options,
     ) as image:  # fmt: skip
-        image.set_band_description(1, name or kind)
+        if kind == RGB:
+            for band, colour in enumerate((*COLOURS, "opacity"), start=1):
+                image.set_band_description(band, colour)
+        else:
+            image.set_band_description(1, name or kind)
         if palette:
             image.write_colormap(1, {code: (*colour, 255) for code, (_, colour) in palette.entries.items()})
             image.update_tags(1, **{f"{kind.upper()}_{code}": name for code, (name, _) in palette.entries.items()})
-        else:
+        elif kind != RGB:
             image.units = (UNIT[kind],)
         for column, pixels in blocks:
-            image.write(pixels, 1, window=Window(column, 0, pixels.shape[1], extent.rows))
+            bands_of = np.moveaxis(np.atleast_3d(pixels), 2, 0)
+            image.write(bands_of, window=Window(column, 0, pixels.shape[1], extent.rows))
     rasterio.shutil.copy(
         str(plain), str(path), driver="COG", compress="DEFLATE", predictor="NO" if palette else "YES",
         overview_resampling="MODE" if palette else "AVERAGE", bigtiff="IF_SAFER",

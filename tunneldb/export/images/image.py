@@ -19,11 +19,12 @@ from tunneldb.export.images import preview
 from tunneldb.export.images.class_raster import ClassPainter
 from tunneldb.export.images.cog import Extent, write_cog
 from tunneldb.export.images.palette import PALETTES
+from tunneldb.export.images.tile_png import coloured
 from tunneldb.export.images.underwater import export_bed, export_submerged
 from tunneldb.files import replacing
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.raster.gap_fill import FILL_NOTE, MAX_FILL_DISTANCE, fill_blocks
-from tunneldb.raster.geotiff import DEVIATION_KINDS, KINDS, laid
+from tunneldb.raster.geotiff import DEVIATION_KINDS, KINDS, RGB, laid
 from tunneldb.raster.grid import BLOCK
 from tunneldb.raster.overview import shrink, shrink_codes
 from tunneldb.store.alignment import load_stationing
@@ -43,9 +44,10 @@ def export_kilometre(conn: psycopg.Connection, survey: Survey, km: int, folder: 
     All are of one moment; the connection must be idle.
 
     The GeoTIFFs have dB or m as single-precision numbers, NaN without a point; or the state of a pixel; or the code of a class,
-    0 without a point. x is the chainage and y the arc, m. Each file appears when complete. Classes exist if stage ground has
-    run: they are computed from the offset image and the results of that stage. Deviation is written for each layer that the
-    survey was compared with. If sonar scans were loaded, the bed and their unrolled points are written too.
+    0 without a point; or red, green, blue and opacity, if points have colours. x is the chainage and y the arc, m. Each file
+    appears when complete. Classes exist if stage ground has run: they are computed from the offset image and the results of
+    that stage. Deviation is written for each layer that the survey was compared with. If sonar scans were loaded, the bed and
+    their unrolled points are written too.
 
     Returns
     -------
@@ -55,7 +57,7 @@ def export_kilometre(conn: psycopg.Connection, survey: Survey, km: int, folder: 
     with snapshot(conn):
         written = [
             path
-            for kind in (*KINDS, *DEVIATION_KINDS.values(), *PALETTES)
+            for kind in (*KINDS, RGB, *DEVIATION_KINDS.values(), *PALETTES)
             for path in _export_kind(conn, survey, km, kind, folder)
         ]
         below = (export(conn, survey, km, folder) for export in (export_submerged, export_bed))
@@ -118,7 +120,7 @@ def _export_kind(conn: psycopg.Connection, survey: Survey, km: int, kind: str, f
     if not blocks or (kind == "class" and painter is None):
         return []
     first = load_block(conn, survey, km, stored, blocks[0])
-    rows, width = first.values.shape
+    rows, width = first.values.shape[:2]
     extent = Extent(first.transform, rows, width * (blocks[-1] - blocks[0] + 1))
     stem = f"{survey.name}-km{km:03d}-{kind}"
     tiff, png = folder / f"{stem}.tif", folder / f"{stem}.png"
@@ -138,6 +140,7 @@ _TITLES = {
     "corrected": "corrected intensity",
     "offset": "offset from the section surface",
     **{kind: f"deviation from the design of layer {layer}" for layer, kind in DEVIATION_KINDS.items()},
+    RGB: "colour",
     "state": "states",
     "class": "classes",
 }
@@ -168,7 +171,7 @@ class _Sheet:
         by_start: dict[float, Single] = {}
         for west, values in self._blocks:
             start = np.floor(west / preview.STRIP + 1e-9) * preview.STRIP
-            strip = by_start.setdefault(start, np.full((values.shape[0], width), np.nan, np.float32))
+            strip = by_start.setdefault(start, np.full((values.shape[0], width, *values.shape[2:]), np.nan, np.float32))
             column = round((west - start) / self.pixel)
             strip[:, column : column + values.shape[1]] = values[:, : width - column]
         for start in sorted(by_start):
@@ -184,13 +187,15 @@ def _pixels(
     painter: ClassPainter | None,
     sheet: _Sheet,
 ) -> Iterator[tuple[int, NDArray[Any]]]:
-    """Yield first column and pixels of each stored block, as 8-bit codes or classes, and add them to the preview."""
+    """Yield first column and pixels of each stored block, as 8-bit codes, classes or colours, and add them to the preview."""
     for block in blocks:
         raster = load_block(conn, survey, km, kind, block)
         pixels: NDArray[Any] = raster.values if painter is None else painter.paint(raster)
         if kind in PALETTES:
             pixels = pixels.astype(np.uint8, copy=False)
         sheet.note(raster.transform.c, pixels)
+        if kind == RGB:
+            pixels = coloured(raster.values)
         yield (block - blocks[0]) * pixels.shape[1], pixels
 
 

@@ -19,7 +19,7 @@ from tunneldb.export.images.palette import BLUE, PALETTES, RED, WHITE
 from tunneldb.finding_kind import REVIEW_COLOURS, rgb
 from tunneldb.geometry.stationing import Stationing
 from tunneldb.raster.gap_fill import MAX_FILL_DISTANCE, fill_gaps
-from tunneldb.raster.geotiff import DEVIATION_KINDS
+from tunneldb.raster.geotiff import DEVIATION_KINDS, RGB
 
 STRIP = 100.0
 """Length of a strip, m."""
@@ -84,8 +84,8 @@ def draw(
     title : str
         Heading.
     kind : str
-        'raw', 'corrected', 'offset', 'state', 'class', or one of deviation. Intensities are drawn in grey between their 2nd and
-        98th percentile, offsets and deviations in blue (outside) to red (inside), states and classes in their colours.
+        'raw', 'corrected', 'offset', 'rgb', 'state', 'class', or one of deviation. Intensities are drawn in grey between their
+        2nd and 98th percentile, offsets and deviations in blue (outside) to red (inside), states and classes in their colours.
     strips : sequence of Strip
         In order of chainage.
     stationing : Stationing
@@ -124,7 +124,7 @@ def _held(strips: Sequence[Strip], pixel: float) -> list[Strip]:
     """Return the strips from the first tick before any content to the last behind it."""
     there = np.zeros(max(s.values.shape[1] for s in strips), dtype=bool)
     for strip in strips:
-        there[: strip.values.shape[1]] |= np.isfinite(strip.values).any(axis=0)
+        there[: strip.values.shape[1]] |= np.isfinite(strip.values).any(axis=(0, *range(2, strip.values.ndim)))
     at = np.flatnonzero(there)
     if len(at) == 0:
         return list(strips)
@@ -147,6 +147,9 @@ def _head(
     if kind in PALETTES:
         pen.text((_MARGIN, 8), f"{title}:", _INK, font)
         return _legend(pen, _MARGIN + int(pen.textlength(f"{title}:  ", font)), kind, strips, font)
+    if kind == RGB:
+        pen.text((_MARGIN, 8), title, _INK, font)
+        return _MARGIN + int(pen.textlength(title, font))
     low, high = span
     scale = (
         f"blue {1e3 * low:+.0f} mm (outside) to red {1e3 * high:+.0f} mm (inside)"
@@ -180,7 +183,7 @@ def _legend(
 
 def _span(kind: str, strips: Sequence[Strip]) -> tuple[float, float]:
     held = np.concatenate([s.values[np.isfinite(s.values)] for s in strips])
-    if len(held) == 0 or kind in PALETTES:
+    if len(held) == 0 or kind in PALETTES or kind == RGB:
         return 0.0, 1.0
     if kind in _SIGNED:
         usual = float(np.percentile(np.abs(held), 90))
@@ -197,6 +200,8 @@ def _colours(kind: str, values: Single, low: float, high: float) -> UInt8:
         for code, (_, colour_of_code) in PALETTES[kind].entries.items():
             table[code] = colour_of_code
         return np.asarray(table[np.nan_to_num(values).astype(np.uint8)])
+    if kind == RGB:
+        return np.where(np.isnan(values), np.array(_EMPTY, np.float32), values).astype(np.uint8)
     with np.errstate(invalid="ignore"):
         share = np.clip((values - low) / (high - low), 0.0, 1.0)[..., None]
     if kind in _SIGNED:

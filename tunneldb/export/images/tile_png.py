@@ -10,6 +10,7 @@ from PIL import Image
 
 from tunneldb.arrays import Single, UInt8
 from tunneldb.export.images.palette import BLUE, PALETTES, RED, WHITE
+from tunneldb.raster.geotiff import RGB
 
 
 @dataclass(frozen=True)
@@ -27,7 +28,9 @@ def is_signed(kind: str) -> bool:
 
 def tile_png(values: Single, kind: str, stretch: Stretch) -> bytes:
     """Return values (rows, columns) as a PNG, transparent where they are NaN."""
-    if kind in PALETTES:
+    if kind == RGB:
+        image = Image.fromarray(coloured(values), "RGBA")
+    elif kind in PALETTES:
         image = Image.fromarray(_painted(values, kind), "RGBA")
     elif is_signed(kind):
         image = Image.fromarray(_signed(values, stretch), "RGBA")
@@ -36,6 +39,12 @@ def tile_png(values: Single, kind: str, stretch: Stretch) -> bytes:
     written = io.BytesIO()
     image.save(written, "PNG", compress_level=1)
     return written.getvalue()
+
+
+def coloured(values: Single) -> UInt8:
+    """Return an image in colour (rows, columns, 3) with opacity, 0 where it has no colour."""
+    shown = np.isfinite(values[:, :, :1])
+    return np.dstack([np.rint(np.where(shown, values, 0.0)), np.where(shown, 255, 0)]).astype(np.uint8)
 
 
 def _grey(values: Single, stretch: Stretch) -> UInt8:

@@ -12,7 +12,7 @@ import rasterio
 from tunneldb.arrays import Float
 from tunneldb.export.images.palette import PALETTES, hexadecimal
 from tunneldb.raster.gap_fill import FILL_NOTE
-from tunneldb.raster.geotiff import CHANGE, DEVIATION_KINDS
+from tunneldb.raster.geotiff import CHANGE, DEVIATION_KINDS, RGB
 from tunneldb.raster.grey import grey_range
 
 FILLED = "-filled"
@@ -24,6 +24,7 @@ BED, SUBMERGED = "bed", "submerged"
 KINDS = {
     "corrected": "Intensity, corrected",
     f"corrected{FILLED}": f"Intensity, corrected, {FILL_NOTE}",
+    RGB: "Colour",
     "raw": "Intensity, raw",
     "offset": "Offset",
     f"offset{FILLED}": f"Offset, {FILL_NOTE}",
@@ -91,10 +92,15 @@ def pipe(kind: str, paths: Sequence[Path]) -> ET.Element:
     """Return the element with the style of an image, the same for all of its kind.
 
     Intensity is drawn in grey, offset, deviation and change in diverging colours, each state or class in its own; depth the
-    darker the deeper.
+    darker the deeper. An image in colour has its own colours.
     """
     element = ET.Element("pipe")
-    if kind in PALETTES:
+    alpha = "-1"
+    if kind == RGB:
+        renderer, alpha = ET.SubElement(element, "rasterrenderer", type="multibandcolor"), "4"
+        renderer.attrib.update({"redBand": "1", "greenBand": "2", "blueBand": "3"})
+        _origin(renderer)
+    elif kind in PALETTES:
         renderer = ET.SubElement(element, "rasterrenderer", type="paletted", band="1")
         entries = ET.SubElement(renderer, "colorPalette")
         for code, (name, rgb) in PALETTES[kind].entries.items():
@@ -116,7 +122,7 @@ def pipe(kind: str, paths: Sequence[Path]) -> ET.Element:
         ET.SubElement(enhancement, "minValue").text = f"{limits[0]:.3f}"
         ET.SubElement(enhancement, "maxValue").text = f"{limits[1]:.3f}"
         ET.SubElement(enhancement, "algorithm").text = "StretchToMinimumMaximum"
-    renderer.attrib.update({"opacity": "1", "alphaBand": "-1", "nodataColor": ""})
+    renderer.attrib.update({"opacity": "1", "alphaBand": alpha, "nodataColor": ""})
     ET.SubElement(element, "brightnesscontrast", brightness="0", contrast="0", gamma="1")
     ET.SubElement(element, "huesaturation", saturation="0", colorizeOn="0", grayscaleMode="0")
     resampler = ET.SubElement(element, "rasterresampler", maxOversampling="2")

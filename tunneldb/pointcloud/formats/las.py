@@ -19,13 +19,19 @@ from tunneldb.pointcloud.formats.faults import check_ranges, decoding, require_d
 from tunneldb.pointcloud.formats.las_bounds import POINTWISE, check_envelope, count_contradiction, point_counts
 from tunneldb.pointcloud.formats.las_header import HEADER_SIZE
 from tunneldb.pointcloud.formats.laz_chunks import VariedChunks, count_points
-from tunneldb.pointcloud.points import CHUNK, Ranges, Raw, ScanHeader
+from tunneldb.pointcloud.points import CHUNK, COLOURS, Ranges, Raw, ScanHeader
 from tunneldb.pointcloud.stated_crs import StatedCrs, stated_in_las
 from tunneldb.threads import threads
 
 KIND = "a LAS or LAZ"
 FIRST_OF_WKT = 6
 """Point format from which a coordinate system is stated by WKT only."""
+
+
+COLOURED = frozenset((2, 3, 5, 7, 8, 10))
+"""Point formats with colours."""
+
+_POINT_FORMAT = 104  # its offset in the header, bytes; the highest bits mark compression
 
 
 @dataclass(frozen=True)
@@ -78,6 +84,13 @@ def read_las_header(path: Path) -> ScanHeader:
         raise InputError(f"{path}: the file holds no points")
     _check_scales(path, scales, offsets)
     return ScanHeader(path, count, dimensions, stated, np.array(header.mins), np.array(header.maxs), notes=notes)
+
+
+def has_las_colours(path: Path) -> bool:
+    """Return True if the point format of a LAS or LAZ file has colours; reads the beginning of the header only."""
+    with decoding(path, KIND), path.open("rb") as file:
+        start = file.read(_POINT_FORMAT + 1)
+    return len(start) > _POINT_FORMAT and start[_POINT_FORMAT] & 0b111111 in COLOURED
 
 
 def open_las(path: Path, **options: Any) -> laspy.LasReader:
@@ -207,7 +220,7 @@ class _Taker:
             array["point_source_id"],
             self._intensity(record),
             np.asarray(record["classification"]),
-            np.column_stack([array[name] for name in ("red", "green", "blue")]) if self.coloured else None,
+            np.column_stack([array[name] for name in COLOURS]) if self.coloured else None,
         )
 
     def _intensity(self, record: Any) -> NDArray[Any] | None:

@@ -20,7 +20,7 @@ from tunneldb.pointcloud.formats.columns import COORDINATES, meaning_of
 from tunneldb.pointcloud.formats.faults import check_ranges, decoding, require_dimension
 from tunneldb.pointcloud.formats.text import CloudBuilder, TextCloud, TextScan, read_cloud
 from tunneldb.pointcloud.formats.text_lines import TextLines
-from tunneldb.pointcloud.points import CHUNK, Ranges, Raw, ScanHeader
+from tunneldb.pointcloud.points import CHUNK, COLOURS, Ranges, Raw, ScanHeader, colours_of
 from tunneldb.pointcloud.stated_crs import stated_in_comments
 
 KIND = "a PLY"
@@ -88,15 +88,25 @@ def read_ply_header(path: Path) -> ScanHeader:
     return ScanHeader(path, found.count, found.dimensions, stated_in_comments(found.comments), low, high)
 
 
-def read_ply(path: Path, dimension: str | None, size: int, ranges: Ranges | None = None) -> Iterator[Raw]:
+def has_ply_colours(path: Path) -> bool:
+    """Return True if the vertices of a PLY file have colours."""
+    with decoding(path, KIND):
+        status = path.stat()
+    return set(COLOURS) <= set(_look_through(path, (status.st_size, status.st_mtime_ns))[0].names)
+
+
+def read_ply(
+    path: Path, dimension: str | None, size: int, ranges: Ranges | None = None, colours: bool = False
+) -> Iterator[Raw]:
     """Read a PLY file chunk by chunk; see `tunneldb.pointcloud.formats.raw.read_raw`."""
     with decoding(path, KIND):
         status = path.stat()
     found, text, _, _ = _look_through(path, (status.st_size, status.st_mtime_ns))
     if text is not None:
-        yield from read_cloud(text, dimension, size, ranges)
+        yield from read_cloud(text, dimension, size, ranges, colours)
         return
     require_dimension(path, dimension, found.dimensions)
+    coloured = colours and set(COLOURS) <= set(found.names)
     for begin, end in check_ranges(path, ranges, found.count):
         for at in range(begin, end, size):
             with decoding(path, KIND):
@@ -111,6 +121,7 @@ def read_ply(path: Path, dimension: str | None, size: int, ranges: Ranges | None
                 vertices["scan_id"].astype(np.int32) if "scan_id" in found.names else np.zeros(len(vertices), np.int32),
                 None if dimension is None else vertices[dimension],
                 vertices["classification"].astype(np.uint8) if "classification" in found.names else None,
+                colours_of(np.column_stack([vertices[name] for name in COLOURS])) if coloured else None,
             )
 
 

@@ -36,7 +36,7 @@ def read_raw(
     units : Units
         Units of the coordinates, which become part of scales and offsets.
     colours : bool
-        True to read colours, from the formats that have them (LAS, LAZ, E57).
+        True to read colours, of files that have them.
 
     Yields
     ------
@@ -49,9 +49,5 @@ def read_raw(
     InputError
         If the file is missing, truncated or corrupt, has fewer points than the ranges say, or lacks the dimension.
     """
-    form = format_of(path)
-    if colours and form.has_colours is not None:
-        chunks = form.read(path, dimension, size, ranges, True)
-    else:
-        chunks = form.read(path, dimension, size, ranges)
+    chunks = format_of(path).read(path, dimension, size, ranges, colours)
     return chunks if units.metric else (raw.in_metres(units) for raw in chunks)

@@ -18,9 +18,9 @@ from tunneldb.pointcloud.formats.las_header import Head
 from tunneldb.pointcloud.formats.las_records import fields, record_size
 from tunneldb.pointcloud.formats.raw import read_raw
 from tunneldb.pointcloud.formats.table import format_of
+from tunneldb.pointcloud.points import COLOURS
 
 _SCALE = 1e-4  # m; finer than any scanner measures, and an int32 of it reaches 214 km
-_COLOURS = ("red", "green", "blue")
 _STANDARD = ("gps_time", "scan_id", "classification")
 _SCAN_ID_LIMIT = 2**16
 
@@ -46,9 +46,9 @@ class RawRecords:
         self.path = path
         header = format_of(path).header(path)
         self.columns = [name for name in header.dimensions if name not in _STANDARD]
-        coloured = set(_COLOURS) <= set(self.columns)
+        coloured = set(COLOURS) <= set(self.columns)
         self.format = 7 if coloured else 6
-        self.extras = [name for name in self.columns if not (coloured and name in _COLOURS)]
+        self.extras = [name for name in self.columns if not (coloured and name in COLOURS)]
         self.scale = _SCALE
         with np.errstate(invalid="ignore"):
             while np.max(header.high - header.low) / self.scale > 2**30:
@@ -97,7 +97,7 @@ class RawRecords:
             }
             if "intensity" in values:
                 point["intensity"] = spread(values["intensity"], *_limits(values["intensity"]))
-            for name in _COLOURS if self.format == 7 else ():
+            for name in COLOURS if self.format == 7 else ():
                 point[name] = spread(values[name], *_limits(values[name]))
             for place, name in enumerate(self.extras):
                 extra: Float = np.ndarray((len(out),), "<f8", out.data, before + 8 * place, (out.shape[1],))

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from tunneldb.errors import InputError
 from tunneldb.pointcloud.formats.e57 import read_e57, read_e57_header, read_e57_scans
-from tunneldb.pointcloud.formats.las import read_las, read_las_header
+from tunneldb.pointcloud.formats.las import has_las_colours, read_las, read_las_header
 from tunneldb.pointcloud.formats.las_header import SIGNATURE
-from tunneldb.pointcloud.formats.ply import read_ply, read_ply_header
+from tunneldb.pointcloud.formats.ply import has_ply_colours, read_ply, read_ply_header
 from tunneldb.pointcloud.formats.ptx import read_ptx, read_ptx_scans
 from tunneldb.pointcloud.formats.scans import PosedScan
 from tunneldb.pointcloud.formats.text import TextCloud, read_cloud
@@ -30,21 +30,20 @@ class Format:
         See `tunneldb.pointcloud.reader.read_header`.
     read : callable
         See `tunneldb.pointcloud.formats.raw.read_raw`.
+    has_colours : callable
+        Function that returns True if the points of a file have colours.
     scans : callable or None
         Function that returns the scans of a file with their positions; None if the format has no scans.
     is_las : bool
         True for LAS and LAZ.
-    has_colours : callable or None
-        Function that returns True if the points of a file have colours; ``read`` then takes one more argument, True to read
-        them. None if colours are not read.
     """
 
     name: str
     header: Callable[[Path], ScanHeader]
     read: Callable[..., Iterator[Raw]]
+    has_colours: Callable[[Path], bool]
     scans: Callable[[Path], Sequence[PosedScan]] | None = None
     is_las: bool = False
-    has_colours: Callable[[Path], bool] | None = None
 
 
 def format_of(path: Path) -> Format:
@@ -97,8 +96,7 @@ def has_colours(path: Path) -> bool:
     InputError
         If the file cannot be read or contains no points.
     """
-    check = format_of(path).has_colours
-    return check is not None and check(path)
+    return format_of(path).has_colours(path)
 
 
 def _scans_of_e57(path: Path) -> list[PosedScan]:
@@ -111,7 +109,8 @@ def _of_text(
     return Format(
         name,
         lambda path: look(path).header(),
-        lambda path, dimension, size, ranges: read_cloud(look(path), dimension, size, ranges),
+        lambda path, dimension, size, ranges, colours=False: read_cloud(look(path), dimension, size, ranges, colours),
+        lambda path: look(path).has_colours,
         scans,
     )
 
@@ -121,8 +120,8 @@ _LAS = Format(
     "LAS or LAZ",
     read_las_header,
     read_las,
+    has_las_colours,
     is_las=True,
-    has_colours=lambda path: "red" in read_las_header(path).dimensions,
 )
 _TABLE = _of_text("table of points", read_table)
 _FORMATS = {
@@ -130,11 +129,11 @@ _FORMATS = {
         "E57",
         read_e57_header,
         read_e57,
+        lambda path: any(scan.has_colours for scan in read_e57_scans(path)),
         _scans_of_e57,
-        has_colours=lambda path: any(scan.has_colours for scan in read_e57_scans(path)),
     ),
     ".ptx": _of_text("PTX", read_ptx, read_ptx_scans),
     ".pts": _of_text("PTS", read_table),
-    ".ply": Format("PLY", read_ply_header, read_ply),
+    ".ply": Format("PLY", read_ply_header, read_ply, has_ply_colours),
     **dict.fromkeys((".xyz", ".txt", ".asc", ".csv"), _TABLE),
 }

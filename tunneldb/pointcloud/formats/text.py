@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from tunneldb.pointcloud.formats.columns import COORDINATES, SKIPPED
 from tunneldb.pointcloud.formats.faults import check_ranges, decoding, require_dimension
 from tunneldb.pointcloud.formats.scans import PosedScan
 from tunneldb.pointcloud.formats.text_lines import TextLines, parse
-from tunneldb.pointcloud.points import Ranges, Raw, ScanHeader
+from tunneldb.pointcloud.points import COLOURS, Ranges, Raw, ScanHeader, colours_of
 from tunneldb.pointcloud.stated_crs import StatedCrs
 
 KIND = "a text"
@@ -79,9 +79,13 @@ class TextTable:
         """Return the column of that name; None if there is none."""
         return self.values[:, self.names.index(name)] if name in self.names else None
 
+    def columns(self, names: Sequence[str]) -> Float:
+        """Return the columns of these names (n, k)."""
+        return self.values[:, [self.names.index(name) for name in names]]
+
     def own(self) -> Float:
         """Return coordinates in the scan's own frame (n, 3), m."""
-        return self.values[:, [self.names.index(name) for name in COORDINATES]]
+        return self.columns(COORDINATES)
 
     def turned(self) -> Float:
         """Return coordinates rotated into the file's frame, without the scan's position (n, 3), m."""
@@ -130,6 +134,11 @@ class TextCloud:
         """Dimensions of every scan, without coordinates."""
         first = [name for name in self.scans[0].columns if name not in (*COORDINATES, SKIPPED)]
         return tuple(name for name in first if all(name in scan.columns for scan in self.scans))
+
+    @property
+    def has_colours(self) -> bool:
+        """True if the points of a scan have colours."""
+        return any(set(COLOURS) <= set(scan.columns) for scan in self.scans)
 
     def header(self) -> ScanHeader:
         """Return the scan header of the file."""
@@ -180,7 +189,9 @@ class CloudBuilder:
         return TextCloud(self.path, tuple(self.scans), tuple(self.blocks), self.low, self.high)
 
 
-def read_cloud(cloud: TextCloud, dimension: str | None, size: int, ranges: Ranges | None) -> Iterator[Raw]:
+def read_cloud(
+    cloud: TextCloud, dimension: str | None, size: int, ranges: Ranges | None, colours: bool = False
+) -> Iterator[Raw]:
     """Read the points of a text file chunk by chunk; see `tunneldb.pointcloud.formats.raw.read_raw`."""
     path = cloud.path
     require_dimension(path, dimension, cloud.dimensions)
@@ -190,13 +201,13 @@ def read_cloud(cloud: TextCloud, dimension: str | None, size: int, ranges: Range
         for block in cloud.blocks[first:]:
             if block.point >= end:
                 break
-            raw = _read_block(cloud, block, dimension)
+            raw = _read_block(cloud, block, dimension, colours)
             at, stop = max(begin - block.point, 0), min(end - block.point, block.points)
             for place in range(at, stop, size):
                 yield raw.part(place, min(place + size, stop))
 
 
-def _read_block(cloud: TextCloud, block: Block, dimension: str | None) -> Raw:
+def _read_block(cloud: TextCloud, block: Block, dimension: str | None, colours: bool) -> Raw:
     with decoding(cloud.path, KIND), cloud.path.open("rb") as file:
         file.seek(block.offset)
         data = file.read(block.bytes)
@@ -219,6 +230,7 @@ def _read_block(cloud: TextCloud, block: Block, dimension: str | None) -> Raw:
         numbers.astype(np.int32),
         None if dimension is None else table.column(dimension),
         None if classes is None else classes.astype(np.uint8),
+        colours_of(table.columns(COLOURS)) if colours and set(COLOURS) <= set(table.names) else None,
     )
 
 

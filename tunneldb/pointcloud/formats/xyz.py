@@ -25,8 +25,8 @@ from tunneldb.pointcloud.formats.columns import (
 from tunneldb.pointcloud.formats.faults import decoding
 from tunneldb.pointcloud.formats.text import KIND, CloudBuilder, TextCloud, TextScan
 from tunneldb.pointcloud.formats.text_lines import COMMENTS, TextLines, are_numbers, decimal_comma, divider_of, split_values
+from tunneldb.pointcloud.points import COLOURS
 
-COLOURS = ("red", "green", "blue")
 LEICA = {
     3: COORDINATES,
     4: (*COORDINATES, "intensity"),

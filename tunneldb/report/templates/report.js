@@ -147,18 +147,18 @@
     return read.get(leak.strip)[leak.id];
   }
 
-  function picture(leak, shown) {
+  function picture(leak, shown, file, title) {
     const [width, height] = shown.size;
     const bar = [0.5, 1, 2, 5, 10, 20, 50].findLast((length) => length < width / 2) ?? 0.5;
     const [x, y] = [width * 0.04, height * 0.95];
     const drawing = make("svg:svg", { viewBox: `0 0 ${width} ${height}`, class: `view ${leak.review}`, role: "img", "aria-label": _("Lining around leak {id}", { id: leak.id }) });
-    if (shown.picture) {
-      drawing.append(make("svg:image", { width, height, preserveAspectRatio: "none", href: shown.picture }));
+    if (file) {
+      drawing.append(make("svg:image", { width, height, preserveAspectRatio: "none", href: file }));
     }
     drawing.append(make("svg:path", { d: shown.outline }));
     for (let n = 0; n < 2; n += 1) drawing.append(make("svg:line", { x1: x, x2: x + bar, y1: y, y2: y, class: "scale" }));
-    const caption = shown.picture ? _("{width} m of lining; bar {bar} m", { width: width.toFixed(1), bar }) : _("No image here; bar {bar} m", { bar });
-    return make("figure", {}, drawing, make("figcaption", {}, caption));
+    const caption = file ? _("{width} m of lining; bar {bar} m", { width: width.toFixed(1), bar }) : _("No image here; bar {bar} m", { bar });
+    return make("figure", {}, drawing, make("figcaption", {}, title ? `${title}: ${caption}` : caption));
   }
 
   function section(leak, shown) {
@@ -189,8 +189,9 @@
     if (leak.severity) list.append(make("div", {}, make("dt", {}, _("Severity")), make("dd", {}, _(leak.severityLabel))));
     if (leak.origin !== "detected") list.append(make("div", {}, make("dt", {}, _("Origin")), make("dd", {}, _(leak.origin))));
     if (leak.remark) list.append(make("div", { class: "long" }, make("dt", {}, _("Remark")), make("dd", {}, leak.remark)));
-    const pictures = make("div", { class: "pictures" });
-    if (shown) pictures.append(picture(leak, shown));
+    const pictures = make("div", { class: shown && shown.colour ? "pictures coloured" : "pictures" });
+    if (shown) pictures.append(picture(leak, shown, shown.picture, ""));
+    if (shown && shown.colour) pictures.append(picture(leak, shown, shown.colour, _("Colour")));
     if (shown && shown.section) pictures.append(section(leak, shown));
     return make("article", { class: "card" },
       make("header", {}, make("b", {}, `${_(leak.kind)} ${leak.id}`), make("span", {}, leak.label), review(leak)), pictures, list);

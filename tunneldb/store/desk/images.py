@@ -8,12 +8,13 @@ from typing import Any
 
 import psycopg
 
-from tunneldb.raster.geotiff import Raster, decode
+from tunneldb.raster.geotiff import RGB, Raster, decode
 from tunneldb.raster.overview import PREFIX
 
 KINDS = {
     "corrected": ("Corrected intensity", "dB"),
     "raw": ("Raw intensity", "dB"),
+    RGB: ("Colour", ""),
     "offset": ("Offset from the surface", "m"),
     "state": ("State of the pixels", ""),
     "deviation_lining": ("Deviation of the lining", "m"),
@@ -59,7 +60,7 @@ def load_blocks(
         "SELECT block, tiff FROM tunnel_api.image_tiffs(%s, %s, %s)", [survey_id, kind, list(numbers)], binary=True
     )
     for number, tiff in rows.fetchall():
-        yield number, decode(tiff)
+        yield number, decode(tiff, kind)
 
 
 def overview_of(kind: str) -> str:

@@ -1,10 +1,10 @@
-/** Pictures around a finding: raw, corrected and offset, side by side. */
+/** Pictures around a finding: corrected, colour, raw and offset, side by side. */
 
 import { el, fitCanvas } from './dom.js';
 import { colourOf } from './layers.js';
 import { imageAddress, MAX_TILE_ZOOM, MIN_ZOOM, ORIGIN, resolutionAt, surveyExtent, TILE, zoomAt } from './plane.js';
 
-const WANTED = ['corrected', 'raw', 'offset'];
+const WANTED = ['corrected', 'rgb', 'raw', 'offset'];
 const KEPT = 300;
 const MARGIN = 0.6;
 const MIN_SIZE = 1.6;
