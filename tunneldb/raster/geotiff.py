@@ -17,6 +17,12 @@ from tunneldb.arrays import Float, Int16, Single
 from tunneldb.compiled import kernel
 from tunneldb.errors import UserError
 
+IMPORTED = "imported_"
+"""Beginning of the kinds of images of other instruments; their names follow."""
+
+COLOURS = ("red", "green", "blue")
+"""Bands of an imported colour image; each is an image of kind imported_NAME:BAND."""
+
 KINDS = ("raw", "corrected", "offset")
 """Kinds of the images of a kilometre: raw and corrected intensity (dB), offset from the surface (m)."""
 
@@ -69,12 +75,21 @@ class Raster:
 
 def whole(values: Single, kind: str) -> Int16:
     """Convert values (rows, columns) to steps of :data:`STEP`, NODATA for NaN."""
+    return _steps(values, STEP[kind])
+
+
+def _steps(values: Single, step: float) -> Int16:
     steps = np.empty(values.shape, np.int16)
-    _whole(np.ascontiguousarray(values), 1.0 / STEP[kind], steps)
+    _whole(np.ascontiguousarray(values), 1.0 / step, steps)
     return steps
 
 
 def encode(raster: Raster, kind: str) -> bytes:
+    """Write an image of a kind as a GeoTIFF, by its step and unit."""
+    return encode_values(raster, kind, STEP[kind], UNIT[kind])
+
+
+def encode_values(raster: Raster, name: str, step: float, unit: str) -> bytes:
     """Write an image as a GeoTIFF of 16-bit whole numbers, with its scale, unit and nodata value.
 
     The lowest bits are measured noise: fast compression is as good as slow, and differences of neighbours help.
@@ -96,9 +111,9 @@ def encode(raster: Raster, kind: str) -> bytes:
     }
     with MemoryFile() as memory:
         with memory.open(**profile) as image:
-            image.write(whole(raster.values, kind), 1)
-            image.scales, image.units = (STEP[kind],), (UNIT[kind],)
-            image.set_band_description(1, kind)
+            image.write(_steps(raster.values, step), 1)
+            image.scales, image.units = (step,), (unit,)
+            image.set_band_description(1, name)
         return bytes(memory.read())
 
 
@@ -149,3 +164,8 @@ def _whole(values: Single, per_step: float, steps: Int16) -> None:  # pragma: no
             elif not step > NODATA:  # also if it is NaN
                 step = NODATA + 1.0 if step <= NODATA else float(NODATA)
             steps[i, j] = np.int16(step)
+
+
+def imported_kinds(name: str, colour: bool) -> tuple[str, ...]:
+    """Return the kinds of the images of an imported image: one, or one for each colour."""
+    return tuple(f"{IMPORTED}{name}:{band}" for band in COLOURS) if colour else (f"{IMPORTED}{name}",)

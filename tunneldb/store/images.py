@@ -108,9 +108,9 @@ class ImageStore:
         columns = window.columns
         block = grid.first_block + columns.start // grid.block_columns
         if not self._blocks:  # only now: what makes the images takes long, and others look at those that are there
-            # Deviation is not made here: it stays, stale, with its sections.
+            # Deviation is not made here: it stays, stale, with its sections. Images of other instruments stay, too.
             self.conn.execute(
-                "DELETE FROM tunnel.image WHERE survey_id = %s AND km = %s AND kind NOT LIKE '%%deviation%%'",
+                "DELETE FROM tunnel.image WHERE survey_id = %s AND km = %s AND kind !~ '^(overview_)?(deviation|imported)_'",
                 (self.survey.id, grid.km),
             )
         self.pixels += int(np.count_nonzero(window.weight))
