@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -35,7 +35,15 @@ class Extent:
     columns: int
 
 
-def write_cog(path: Path, kind: str, extent: Extent, blocks: Iterable[tuple[int, NDArray[Any]]], name: str = "") -> None:
+def write_cog(
+    path: Path,
+    kind: str,
+    extent: Extent,
+    blocks: Iterable[tuple[int, NDArray[Any]]],
+    name: str = "",
+    unit: str | None = None,
+    tags: Mapping[str, str] | None = None,
+) -> None:
     """Write an image; places without a block are empty (GDAL fills them with the nodata value).
 
     Parameters
@@ -51,6 +59,10 @@ def write_cog(path: Path, kind: str, extent: Extent, blocks: Iterable[tuple[int,
         First column and pixels of each block.
     name : str
         Name of the band, if not its kind.
+    unit : str, optional
+        Unit of the values, if the kind is not one of the survey's own images.
+    tags : mapping of str to str, optional
+        Metadata of the file.
     """
     plain = path.with_name(f"plain-{path.name}")
     palette = PALETTES.get(kind)
@@ -64,11 +76,38 @@ def write_cog(path: Path, kind: str, extent: Extent, blocks: Iterable[tuple[int,
             image.write_colormap(1, {code: (*colour, 255) for code, (_, colour) in palette.entries.items()})
             image.update_tags(1, **{f"{kind.upper()}_{code}": name for code, (name, _) in palette.entries.items()})
         else:
-            image.units = (UNIT[kind],)
+            image.units = (UNIT[kind] if unit is None else unit,)
+        image.update_tags(**(tags or {}))
         for column, pixels in blocks:
             image.write(pixels, 1, window=Window(column, 0, pixels.shape[1], extent.rows))
     rasterio.shutil.copy(
         str(plain), str(path), driver="COG", compress="DEFLATE", predictor="NO" if palette else "YES",
         overview_resampling="MODE" if palette else "AVERAGE", bigtiff="IF_SAFER",
     )  # fmt: skip
+    plain.unlink()
+
+
+def write_colour_cog(
+    path: Path, extent: Extent, blocks: Iterable[tuple[int, NDArray[np.uint8]]], tags: Mapping[str, str]
+) -> None:
+    """Write a colour image: red, green, blue and opacity in 8 bits, compressed as WebP with small losses.
+
+    Parameters
+    ----------
+    path, extent, tags
+        As in :func:`write_cog`.
+    blocks : iterable of (int, (4, rows, columns) array)
+        First column and pixels of each block.
+    """
+    plain = path.with_name(f"plain-{path.name}")
+    with rasterio.open(
+        plain, "w", driver="GTiff", height=extent.rows, width=extent.columns, count=4, transform=extent.transform,
+        dtype="uint8", photometric="RGB", alpha="yes", tiled=True, blockxsize=256, blockysize=256, bigtiff="if_safer",
+    ) as image:  # fmt: skip
+        image.update_tags(**tags)
+        for column, pixels in blocks:
+            image.write(pixels, window=Window(column, 0, pixels.shape[2], extent.rows))
+    rasterio.shutil.copy(
+        str(plain), str(path), driver="COG", compress="WEBP", quality="90", overview_resampling="AVERAGE", bigtiff="IF_SAFER"
+    )
     plain.unlink()

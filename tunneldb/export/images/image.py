@@ -18,6 +18,7 @@ from tunneldb.database import snapshot
 from tunneldb.export.images import preview
 from tunneldb.export.images.class_raster import ClassPainter
 from tunneldb.export.images.cog import Extent, write_cog
+from tunneldb.export.images.imported import export_imported
 from tunneldb.export.images.palette import PALETTES
 from tunneldb.export.images.underwater import export_bed, export_submerged
 from tunneldb.files import replacing
@@ -45,7 +46,8 @@ def export_kilometre(conn: psycopg.Connection, survey: Survey, km: int, folder: 
     The GeoTIFFs have dB or m as single-precision numbers, NaN without a point; or the state of a pixel; or the code of a class,
     0 without a point. x is the chainage and y the arc, m. Each file appears when complete. Classes exist if stage ground has
     run: they are computed from the offset image and the results of that stage. Deviation is written for each layer that the
-    survey was compared with. If sonar scans were loaded, the bed and their unrolled points are written too.
+    survey was compared with. If sonar scans were loaded, the bed and their unrolled points are written too. Imported images are
+    written as ``SURVEY-kmNNN-imported-NAME.tif``.
 
     Returns
     -------
@@ -59,7 +61,7 @@ def export_kilometre(conn: psycopg.Connection, survey: Survey, km: int, folder: 
             for path in _export_kind(conn, survey, km, kind, folder)
         ]
         below = (export(conn, survey, km, folder) for export in (export_submerged, export_bed))
-        return [*written, *(path for path in below if path is not None)]
+        return [*written, *(path for path in below if path is not None), *export_imported(conn, survey, km, folder)]
 
 
 def export_filled(conn: psycopg.Connection, survey: Survey, km: int, folder: Path) -> list[Path]:
