@@ -13,20 +13,10 @@ import rasterio
 from affine import Affine
 from click.testing import CliRunner, Result
 from support.example_survey import NAME
+from support.imported_image import LONG, PIXELS, SPOTS, STATED, TOP, WEST, strip, temperature, write
 
 from tunneldb.cli.main import main
 from tunneldb.raster.geotiff import decode
-
-WEST, EAST, TOP = 12310.0, 12390.0, 8.0
-SPOTS = [(12315.0, 2.0), (12330.3, -6.2), (12343.7, 7.1), (12359.9, 0.4), (12371.2, -3.3), (12386.5, 5.0)]
-"""Hot spots on the lining, chainage and arc, m."""
-
-LONG = Affine(0.02 / 1.02, 0, WEST + 0.05, 0, -0.02, TOP + 0.05)
-"""True place of a strip that states pixels of 20 mm from WEST and TOP: 2 % too long and 5 cm off."""
-
-STATED = Affine(0.02, 0, WEST, 0, -0.02, TOP)
-COLUMNS, ROWS = 4080, 800
-PIXELS = [(40, 60), (70, 750), (1400, 100), (2000, 700), (3300, 450), (4000, 70), (3990, 760)]
 
 
 @pytest.fixture(scope="session")
@@ -42,32 +32,6 @@ def told(*arguments: object) -> dict[str, Any]:
     done = run(*arguments, "--json")
     assert done.exit_code == 0, done.output
     return json.loads(done.stdout)
-
-
-def temperature(chainage: np.ndarray, arc: np.ndarray) -> np.ndarray:
-    out = np.full(np.broadcast_shapes(chainage.shape, arc.shape), 10.0)
-    for x, y in SPOTS:
-        out += 8.0 * np.exp(-((chainage - x) ** 2 + (arc - y) ** 2) / (2 * 0.15**2))
-    return out
-
-
-def strip(place: Affine, columns: int = COLUMNS, rows: int = ROWS) -> np.ndarray:
-    """Temperature of the lining where the pixels of an upright image truly are, °C."""
-    chainage = place.c + (np.arange(columns) + 0.5) * place.a
-    arc = place.f + (np.arange(rows) + 0.5) * place.e
-    return temperature(chainage[None, :], arc[:, None]).astype(np.float32)
-
-
-def write(path: Path, values: np.ndarray, place: Affine | None, unit: str = "", **options: Any) -> Path:
-    bands = values if values.ndim == 3 else values[None]
-    with rasterio.open(
-        path, "w", driver="GTiff", height=bands.shape[1], width=bands.shape[2], count=len(bands), dtype=bands.dtype,
-        transform=place, **options,
-    ) as image:  # fmt: skip
-        image.write(bands)
-        if unit:
-            image.units = (unit,)
-    return path
 
 
 def points(path: Path, place: Affine, wrong: dict[int, tuple[float, float]] | None = None, noise: float = 0.004) -> Path:

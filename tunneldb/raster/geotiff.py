@@ -169,3 +169,8 @@ def _whole(values: Single, per_step: float, steps: Int16) -> None:  # pragma: no
 def imported_kinds(name: str, colour: bool) -> tuple[str, ...]:
     """Return the kinds of the images of an imported image: one, or one for each colour."""
     return tuple(f"{IMPORTED}{name}:{band}" for band in COLOURS) if colour else (f"{IMPORTED}{name}",)
+
+
+def imported_label(name: str, kind: str) -> str:
+    """Return the title of an imported image: of its kind, with its name if that is another."""
+    return f"Imported: {kind}" if name == kind else f"Imported: {kind}, {name}"

@@ -7,10 +7,10 @@ import re
 from starlette.responses import Response
 
 from tunneldb.errors import UserError
-from tunneldb.export.images.tile_png import tile_png
+from tunneldb.export.images.tile_png import colour_png, tile_png
 from tunneldb.raster.tiles import Tile, display
 from tunneldb.store.desk.findings import finding_tile
-from tunneldb.store.desk.images import KINDS
+from tunneldb.store.desk.images import find_image
 from tunneldb.web.route import Call, NotFoundError
 from tunneldb.web.surveys import no_kind, survey_of
 from tunneldb.web.tile_source import survey_stretch, tile_images
@@ -25,18 +25,22 @@ REVALIDATE = "private, no-cache"
 def image_tile(call: Call) -> Response:
     """Return a tile of an image; 304 if the browser has it."""
     kind, tile = call.path["kind"], tile_of(call, "png")
-    if kind not in KINDS:
-        raise no_kind(kind)
     with call.session.connection() as conn:
         survey = survey_of(conn, call.path["survey"])
-        images, tag = tile_images(call.desk.blocks, conn, survey, kind, tile)
-        headers = {"ETag": f'"{tag}"', "Cache-Control": REVALIDATE}
+        image = find_image(conn, survey.id, kind)
+        if image is None:
+            raise no_kind(kind)
+        bands = [tile_images(call.desk.blocks, conn, survey, band, tile) for band in image.bands]
+        headers = {"ETag": f'"{"-".join(tag for _, tag in bands)}"', "Cache-Control": REVALIDATE}
         if call.headers.get("if-none-match") == headers["ETag"]:
             return Response(status_code=304, headers=headers)
-        if not images:
+        if not bands[0][0]:
             return Response(status_code=204, headers=headers)
-        stretch = survey_stretch(call.desk.blocks, conn, survey, kind)
-    return Response(tile_png(display(tile, images, kind == "state"), kind, stretch), media_type="image/png", headers=headers)
+        colour = len(bands) > 1
+        stretch = None if colour else survey_stretch(call.desk.blocks, conn, survey, kind)
+    shown = [display(tile, images, kind == "state") for images, _ in bands]
+    content = colour_png(shown) if stretch is None else tile_png(shown[0], image.palette, stretch)
+    return Response(content, media_type="image/png", headers=headers)
 
 
 def vector_tile(call: Call) -> Response:

@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import psycopg
 
-from tunneldb.arrays import Single, UInt8
+from tunneldb.arrays import Single
 from tunneldb.export.images.cog import Extent, write_cog, write_colour_cog
+from tunneldb.export.images.tile_png import opaque
 from tunneldb.files import replacing
 from tunneldb.store.images import image_blocks, load_kinds
 from tunneldb.store.imported_images import StoredImage, read_imported
@@ -44,7 +44,7 @@ def _export(conn: psycopg.Connection[Any], survey: Survey, km: int, image: Store
     path = folder / f"{survey.name}-km{km:03d}-imported-{image.name}.tif"
     with replacing(path) as temporary:
         if image.colour:
-            write_colour_cog(temporary, extent, ((column, _opaque(values)) for column, values in bands()), image_tags(image))
+            write_colour_cog(temporary, extent, ((column, opaque(values)) for column, values in bands()), image_tags(image))
         else:
             values = ((column, values[0]) for column, values in bands())
             write_cog(temporary, image.kind, extent, values, image.name, image.unit, image_tags(image))
@@ -64,11 +64,3 @@ def image_tags(image: StoredImage) -> dict[str, str]:
     if image.residual is not None:
         tags["TUNNELDB_RESIDUAL"] = f"{image.residual:.4f} m"
     return tags
-
-
-def _opaque(bands: list[Single]) -> UInt8:
-    """Return colours (4, rows, columns), the last one opacity: 0 where there is no value."""
-    colours = np.stack(bands)
-    held = np.isfinite(colours).all(axis=0)
-    shown = np.where(held, np.rint(colours), 0.0)
-    return np.concatenate([np.clip(shown, 0, 255), np.where(held, 255, 0)[None]]).astype(np.uint8)

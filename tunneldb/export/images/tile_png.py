@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from PIL import Image
 
 from tunneldb.arrays import Single, UInt8
-from tunneldb.export.images.palette import BLUE, PALETTES, RED, WHITE
+from tunneldb.export.images.palette import BLUE, PALETTES, RAMPS, RED, WHITE, Colour
 
 
 @dataclass(frozen=True)
@@ -29,13 +30,41 @@ def tile_png(values: Single, kind: str, stretch: Stretch) -> bytes:
     """Return values (rows, columns) as a PNG, transparent where they are NaN."""
     if kind in PALETTES:
         image = Image.fromarray(_painted(values, kind), "RGBA")
+    elif kind in RAMPS:
+        image = Image.fromarray(_ramped(values, RAMPS[kind], stretch), "RGBA")
     elif is_signed(kind):
         image = Image.fromarray(_signed(values, stretch), "RGBA")
     else:
         image = Image.fromarray(_grey(values, stretch), "LA")
+    return _png(image)
+
+
+def colour_png(bands: Sequence[Single]) -> bytes:
+    """Return red, green and blue (rows, columns), 0 to 255, as a PNG, transparent where one of them is NaN."""
+    return _png(Image.fromarray(opaque(bands).transpose(1, 2, 0), "RGBA"))
+
+
+def opaque(bands: Sequence[Single]) -> UInt8:
+    """Return colours (4, rows, columns), the last one opacity: 0 where a band is NaN."""
+    colours = np.stack(bands)
+    held = np.isfinite(colours).all(axis=0)
+    shown = np.where(held, np.rint(colours), 0.0)
+    return np.concatenate([np.clip(shown, 0, 255), np.where(held, 255, 0)[None]]).astype(np.uint8)
+
+
+def _png(image: Image.Image) -> bytes:
     written = io.BytesIO()
     image.save(written, "PNG", compress_level=1)
     return written.getvalue()
+
+
+def _ramped(values: Single, ramp: Sequence[Colour], stretch: Stretch) -> UInt8:
+    """Return colours between those of a ramp, which are at equal distances."""
+    shown = np.isfinite(values)
+    share = (np.where(shown, values, stretch.low) - stretch.low) / max(stretch.high - stretch.low, 1e-9)
+    place = np.clip(share, 0.0, 1.0) * (len(ramp) - 1)
+    bands = [np.interp(place, np.arange(len(ramp)), [colour[band] for colour in ramp]) for band in range(3)]
+    return np.dstack([*bands, np.where(shown, 255, 0)]).astype(np.uint8)
 
 
 def _grey(values: Single, stretch: Stretch) -> UInt8:

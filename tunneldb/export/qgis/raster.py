@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,9 +11,9 @@ import numpy as np
 import rasterio
 
 from tunneldb.arrays import Float
-from tunneldb.export.images.palette import PALETTES, hexadecimal
+from tunneldb.export.images.palette import PALETTES, RAMPS, hexadecimal
 from tunneldb.raster.gap_fill import FILL_NOTE
-from tunneldb.raster.geotiff import CHANGE, DEVIATION_KINDS
+from tunneldb.raster.geotiff import CHANGE, DEVIATION_KINDS, imported_label
 from tunneldb.raster.grey import grey_range
 
 FILLED = "-filled"
@@ -52,11 +53,21 @@ OFFSET_COLOURS = ((-1.0, "#2166ac"), (-0.4, "#92c5de"), (0.0, "#e6e6e6"), (0.4, 
 _DEPTH_COLOURS = ("#eff3ff", "#bdd7e7", "#6baed6", "#3182bd", "#08519c")
 _DEPTH = 2  # band of the depth in a raster of the bed
 _SAMPLE = 1000
+_SHOWN = (0.02, 0.98)  # quantiles of the values of an imported image with the first and the last colour
+
+
+_IMPORTED = re.compile(r"-km-?\d+-imported-([a-z0-9-]+)")
+
+
+def imported_name(path: Path) -> str | None:
+    """Return the name of an imported image by its file name, None if it is no imported image."""
+    found = _IMPORTED.search(path.stem)
+    return None if found is None or found.end() != len(path.stem) else found[1]
 
 
 def image_kind(path: Path) -> str | None:
-    """Return the kind of an image by its file name, None if it is no image of the lining."""
-    return next((kind for kind in KINDS if path.stem.endswith(kind)), None)
+    """Return the kind of an image by its file name, None if it is no image of the lining by the survey itself."""
+    return None if imported_name(path) else next((kind for kind in KINDS if path.stem.endswith(kind)), None)
 
 
 def offset_range(paths: Sequence[Path], ranges: Sequence[float] = OFFSET_RANGES) -> float:
@@ -109,20 +120,70 @@ def pipe(kind: str, paths: Sequence[Path]) -> ET.Element:
         named = zip(np.linspace(shallow, deep, len(_DEPTH_COLOURS)).tolist(), _DEPTH_COLOURS, strict=True)
         renderer = _ramp(element, _DEPTH, [(depth, f"{depth:.2f} m", colour) for depth, colour in named])
     else:
-        limits = grey_range(_sample(paths))
-        renderer = ET.SubElement(element, "rasterrenderer", type="singlebandgray", grayBand="1", gradient="BlackToWhite")
-        _origin(renderer)
-        enhancement = ET.SubElement(renderer, "contrastEnhancement")
-        ET.SubElement(enhancement, "minValue").text = f"{limits[0]:.3f}"
-        ET.SubElement(enhancement, "maxValue").text = f"{limits[1]:.3f}"
-        ET.SubElement(enhancement, "algorithm").text = "StretchToMinimumMaximum"
+        renderer = _greys(element, grey_range(_sample(paths)))
     renderer.attrib.update({"opacity": "1", "alphaBand": "-1", "nodataColor": ""})
+    _finish(element, smooth=kind not in PALETTES)
+    return element
+
+
+def imported_title(paths: Sequence[Path]) -> str:
+    """Return the title of the group of an imported image: kind, name and unit."""
+    tags = _tags(paths[0])
+    unit = tags.get("TUNNELDB_UNIT")
+    return imported_label(imported_name(paths[0]) or "", tags.get("TUNNELDB_KIND", "other")) + (f", {unit}" if unit else "")
+
+
+def imported_pipe(paths: Sequence[Path]) -> ET.Element:
+    """Return the element with the style of an imported image: its colours, or values in the ramp of their kind or in grey."""
+    with rasterio.open(paths[0]) as image:
+        colour = image.count > 1
+    tags = _tags(paths[0])
+    ramp = RAMPS.get(tags.get("TUNNELDB_KIND", ""))
+    element = ET.Element("pipe")
+    if colour:
+        renderer = ET.SubElement(
+            element, "rasterrenderer", type="multibandcolor", redBand="1", greenBand="2", blueBand="3", alphaBand="4"
+        )
+        renderer.attrib.update({"opacity": "1", "nodataColor": ""})
+    else:
+        values = _sample(paths)
+        low, high = (float(v) for v in np.quantile(values, _SHOWN)) if len(values) else (0.0, 1.0)
+        high = max(high, low + 1e-6)
+        if ramp is None:
+            renderer = _greys(element, (low, high))
+        else:
+            unit = f" {tags.get('TUNNELDB_UNIT', '')}".rstrip()
+            places = np.linspace(low, high, len(ramp)).tolist()
+            stops = [(value, f"{value:.3g}{unit}", hexadecimal(rgb)) for value, rgb in zip(places, ramp, strict=True)]
+            renderer = _ramp(element, 1, stops)
+        renderer.attrib.update({"opacity": "1", "alphaBand": "-1", "nodataColor": ""})
+    _finish(element, smooth=True)
+    return element
+
+
+def _tags(path: Path) -> dict[str, str]:
+    with rasterio.open(path) as image:
+        return dict(image.tags())
+
+
+def _greys(element: ET.Element, limits: tuple[float, float]) -> ET.Element:
+    """Draw the first band in grey between two values; returns the renderer."""
+    renderer = ET.SubElement(element, "rasterrenderer", type="singlebandgray", grayBand="1", gradient="BlackToWhite")
+    _origin(renderer)
+    enhancement = ET.SubElement(renderer, "contrastEnhancement")
+    ET.SubElement(enhancement, "minValue").text = f"{limits[0]:.3f}"
+    ET.SubElement(enhancement, "maxValue").text = f"{limits[1]:.3f}"
+    ET.SubElement(enhancement, "algorithm").text = "StretchToMinimumMaximum"
+    return renderer
+
+
+def _finish(element: ET.Element, *, smooth: bool) -> None:
+    """Add the parts of a style after its renderer."""
     ET.SubElement(element, "brightnesscontrast", brightness="0", contrast="0", gamma="1")
     ET.SubElement(element, "huesaturation", saturation="0", colorizeOn="0", grayscaleMode="0")
     resampler = ET.SubElement(element, "rasterresampler", maxOversampling="2")
-    if kind not in PALETTES:
+    if smooth:
         resampler.set("zoomedOutResampler", "bilinear")
-    return element
 
 
 def _ramp(element: ET.Element, band: int, items: Sequence[tuple[float, str, str]]) -> ET.Element:
