@@ -28,20 +28,26 @@ def is_signed(kind: str) -> bool:
 
 def tile_png(values: Single, kind: str, stretch: Stretch) -> bytes:
     """Return values (rows, columns) as a PNG, transparent where they are NaN."""
+    return _png(paint([values], kind, stretch))
+
+
+def paint(bands: Sequence[Single], kind: str, stretch: Stretch) -> Image.Image:
+    """Return values, or red, green and blue, (rows, columns) each, as a picture, transparent where they are NaN."""
+    if len(bands) > 1:
+        return Image.fromarray(opaque(bands).transpose(1, 2, 0), "RGBA")
+    (values,) = bands
     if kind in PALETTES:
-        image = Image.fromarray(_painted(values, kind), "RGBA")
-    elif kind in RAMPS:
-        image = Image.fromarray(_ramped(values, RAMPS[kind], stretch), "RGBA")
-    elif is_signed(kind):
-        image = Image.fromarray(_signed(values, stretch), "RGBA")
-    else:
-        image = Image.fromarray(_grey(values, stretch), "LA")
-    return _png(image)
+        return Image.fromarray(_painted(values, kind), "RGBA")
+    if kind in RAMPS:
+        return Image.fromarray(_ramped(values, RAMPS[kind], stretch), "RGBA")
+    if is_signed(kind):
+        return Image.fromarray(_signed(values, stretch), "RGBA")
+    return Image.fromarray(_grey(values, stretch), "LA")
 
 
 def colour_png(bands: Sequence[Single]) -> bytes:
     """Return red, green and blue (rows, columns), 0 to 255, as a PNG, transparent where one of them is NaN."""
-    return _png(Image.fromarray(opaque(bands).transpose(1, 2, 0), "RGBA"))
+    return _png(paint(bands, "photo", Stretch(0.0, 255.0)))
 
 
 def opaque(bands: Sequence[Single]) -> UInt8:
