@@ -8,8 +8,9 @@ import numpy as np
 import psycopg
 import pytest
 from click.testing import CliRunner
+from PIL import Image
 from support.example_survey import NAME
-from support.imported_image import STATED, strip, write
+from support.imported_image import SPOTS, STATED, strip, write
 from support.qgis import act
 
 from tunneldb.cli.main import main
@@ -44,3 +45,18 @@ def test_imported_images_are_layers(conn: psycopg.Connection, example: str, tmp_
     seen = act(tmp_path / "demo.qgs", "describe")
     for name in ("raw", "photo"):
         assert seen["layers"][f"demo-2024-km012-imported-{name}"]["valid"]
+    # 1 m by 1 m around each hot spot, which is bright in its middle and dark at the edges
+    for x, y in SPOTS[::2]:
+        picture = tmp_path / "spot.png"
+        told = act(
+            tmp_path / "demo.qgs",
+            "draw_layer",
+            "demo-2024-km012-imported-raw",
+            f"{x - 0.5},{y - 0.5},{x + 0.5},{y + 0.5}",
+            str(picture),
+        )
+        assert told["errors"] == []
+        shown = np.asarray(Image.open(picture).convert("RGB")).astype(int)
+        rows, columns = shown.shape[:2]
+        assert shown[rows // 2, columns // 2, 0] > 200
+        assert shown[rows // 20, columns // 2, 0] < 100

@@ -11,7 +11,7 @@ from PIL import Image
 
 from tunneldb.arrays import Single
 from tunneldb.export.images.palette import RAMPS, hexadecimal
-from tunneldb.export.images.tile_png import Stretch, paint
+from tunneldb.export.images.tile_png import Stretch, imported_stretch, paint
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.raster.geotiff import Raster, imported_label
 from tunneldb.raster.grid import BLOCK, BLOCKS
@@ -24,9 +24,6 @@ from tunneldb.report.lining import NOTHING, QUALITY, Picture, Window
 from tunneldb.report.strip import STRIP_PIXELS
 from tunneldb.store.images import image_blocks, load_kinds
 from tunneldb.store.imported_images import StoredImage, read_imported
-
-SHOWN = (2.0, 98.0)
-"""Percentiles of the values with the first and the last colour."""
 
 
 @dataclass(frozen=True)
@@ -112,10 +109,7 @@ class ShownImage:
             if raster is not None:
                 sample.append(raster.values[np.isfinite(raster.values)])
         values = np.concatenate(sample)
-        if not len(values):
-            return Stretch(self.row.value_from, self.row.value_to)
-        low, high = (float(v) for v in np.percentile(values, SHOWN))
-        return Stretch(low, max(high, low + 1e-6))
+        return imported_stretch(values)
 
     def _picture(self, window: Window, pixel: float) -> Picture | None:
         """Draw a window; None without a value in it."""

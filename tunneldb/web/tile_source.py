@@ -8,8 +8,8 @@ from collections.abc import Hashable, Mapping
 import numpy as np
 
 from tunneldb.export.images.preview import OFFSET_SPANS
-from tunneldb.export.images.tile_png import Stretch, is_signed
-from tunneldb.raster.geotiff import Raster
+from tunneldb.export.images.tile_png import Stretch, imported_stretch, is_signed
+from tunneldb.raster.geotiff import IMPORTED, Raster
 from tunneldb.raster.grid import BLOCK, BLOCKS
 from tunneldb.raster.overview import PIXEL
 from tunneldb.raster.tiles import Tile, reduce
@@ -83,6 +83,8 @@ def _stretch(images: list[Raster], kind: str) -> Stretch:
     shown = values[np.isfinite(values)]
     if not len(shown):
         return Stretch(0.0, 1.0)
+    if kind.startswith(IMPORTED):
+        return imported_stretch(shown)
     if is_signed(kind):
         reach = float(np.percentile(np.abs(shown), 90.0))
         span = next((s for s in OFFSET_SPANS if s >= reach), OFFSET_SPANS[-1])

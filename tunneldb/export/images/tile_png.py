@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from PIL import Image
 
-from tunneldb.arrays import Single, UInt8
+from tunneldb.arrays import Float, Single, UInt8
 from tunneldb.export.images.palette import BLUE, PALETTES, RAMPS, RED, WHITE, Colour
 
 
@@ -19,6 +19,23 @@ class Stretch:
 
     low: float
     high: float
+
+
+SHOWN = (0.5, 99.5)
+"""Percentiles of the values of an imported image with the first and the last colour."""
+
+MIN_SHOWN = 0.2
+"""If these are nearer to each other than this share of all values, as with few hot spots, the least and the greatest are."""
+
+
+def imported_stretch(values: Single | Float) -> Stretch:
+    """Return the values of an imported image with the first and the last colour, from a sample of finite values."""
+    if not len(values):
+        return Stretch(0.0, 1.0)
+    least, low, high, greatest = (float(v) for v in np.percentile(values, (0.0, *SHOWN, 100.0)))
+    if high - low < MIN_SHOWN * (greatest - least):
+        low, high = least, greatest
+    return Stretch(round(low, 6), round(max(high, low + 1e-6), 6))
 
 
 def is_signed(kind: str) -> bool:

@@ -12,6 +12,7 @@ import rasterio
 
 from tunneldb.arrays import Float
 from tunneldb.export.images.palette import PALETTES, RAMPS, hexadecimal
+from tunneldb.export.images.tile_png import imported_stretch
 from tunneldb.raster.gap_fill import FILL_NOTE
 from tunneldb.raster.geotiff import CHANGE, DEVIATION_KINDS, imported_label
 from tunneldb.raster.grey import grey_range
@@ -53,7 +54,6 @@ OFFSET_COLOURS = ((-1.0, "#2166ac"), (-0.4, "#92c5de"), (0.0, "#e6e6e6"), (0.4, 
 _DEPTH_COLOURS = ("#eff3ff", "#bdd7e7", "#6baed6", "#3182bd", "#08519c")
 _DEPTH = 2  # band of the depth in a raster of the bed
 _SAMPLE = 1000
-_SHOWN = (0.02, 0.98)  # quantiles of the values of an imported image with the first and the last colour
 
 
 _IMPORTED = re.compile(r"-km-?\d+-imported-([a-z0-9-]+)")
@@ -146,9 +146,8 @@ def imported_pipe(paths: Sequence[Path]) -> ET.Element:
         )
         renderer.attrib.update({"opacity": "1", "nodataColor": ""})
     else:
-        values = _sample(paths)
-        low, high = (float(v) for v in np.quantile(values, _SHOWN)) if len(values) else (0.0, 1.0)
-        high = max(high, low + 1e-6)
+        stretch = imported_stretch(_sample(paths))
+        low, high = stretch.low, stretch.high
         if ramp is None:
             renderer = _greys(element, (low, high))
         else:
