@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,12 @@ from support.example_survey import NAME
 from support.imported_image import LONG, PIXELS, SPOTS, STATED, TOP, WEST, strip, temperature, write
 
 from tunneldb.cli.main import main
+from tunneldb.raster.accumulator import Window
 from tunneldb.raster.geotiff import decode
+from tunneldb.raster.grid import Grid
+from tunneldb.store.clearing import clear_kilometre
+from tunneldb.store.images import ImageStore
+from tunneldb.store.survey import get_survey
 
 
 @pytest.fixture(scope="session")
@@ -242,3 +248,43 @@ def test_values_are_read_in_sql(conn: psycopg.Connection, example: str, tmp_path
     (kind, survey) = conn.execute("SELECT image, survey_id FROM tunnel_api.imported_image").fetchone()
     (value,) = conn.execute("SELECT tunnel_api.image_value(%s, %s, %s, %s)", [survey, kind, *SPOTS[1]]).fetchone()
     assert value == pytest.approx(18.0, abs=0.1)
+
+
+def test_stages_keep_imported_images(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:
+    told("image", "import", NAME, write(tmp_path / "a.tif", strip(STATED), STATED), "--kind", "thermal")
+    before = conn.execute("SELECT kind, block, md5(tiff) FROM tunnel.image WHERE kind ~ 'imported' ORDER BY 1, 2").fetchall()
+    assert len(before) == 3
+    survey = get_survey(conn, NAME)
+    grid = Grid.covering(12, 0.05, -9.0, 9.0)
+    shape = grid.rows, grid.block_columns
+    window = Window(slice(0, shape[1]), *(np.ones(shape, np.float32) for _ in fields(Window)[1:]))
+    ImageStore(conn, survey, ("offset",)).save(grid, window)
+    assert conn.execute("SELECT count(*) FROM tunnel.image WHERE kind !~ 'imported'").fetchone() == (1,)
+    clear_kilometre(conn, survey, 12)
+    assert conn.execute("SELECT kind, block, md5(tiff) FROM tunnel.image ORDER BY 1, 2").fetchall() == before
+
+
+def test_an_archive_has_imported_images(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:
+    told("image", "import", NAME, write(tmp_path / "a.tif", strip(STATED), STATED), "--kind", "thermal")
+    assert run("survey", "export", NAME, "-o", tmp_path / "s.tdb").exit_code == 0
+    done = run("survey", "import", tmp_path / "s.tdb", "--name", "copy-2024")
+    assert done.exit_code == 0, done.output
+    first, second = (told("image", "list", name)["images"] for name in (NAME, "copy-2024"))
+    assert first == second
+    rows = conn.execute(
+        "SELECT s.name, i.kind, i.block, md5(i.tiff) FROM tunnel.image i JOIN tunnel.survey s ON s.id = i.survey_id"
+        " WHERE i.kind ~ 'imported' ORDER BY 1, 2, 3"
+    ).fetchall()
+    assert [row[1:] for row in rows if row[0] == NAME] == [row[1:] for row in rows if row[0] == "copy-2024"]
+    assert len(rows) == 6
+
+
+def test_a_viewer_sees_the_list_and_may_not_import(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:
+    told("image", "import", NAME, write(tmp_path / "a.tif", strip(STATED, 300), STATED), "--kind", "thermal")
+    conn.execute("SET LOCAL ROLE tunnel_viewer")
+    assert conn.execute("SELECT survey, name, kind FROM tunnel_api.imported_image").fetchall() == [(NAME, "thermal", "thermal")]
+    with pytest.raises(psycopg.errors.InsufficientPrivilege):
+        conn.execute("DELETE FROM tunnel.imported_image")
+    conn.rollback()
+    conn.execute("SET LOCAL ROLE tunnel_operator")
+    assert conn.execute("DELETE FROM tunnel.imported_image").rowcount == 1
