@@ -170,11 +170,27 @@ def test_frames_are_placed_by_a_table(conn: psycopg.Connection, example: str, tm
     (tmp_path / "frames.csv").write_text("\n".join(rows), encoding="utf-8")
     said = told("image", "import", NAME, tmp_path / "frames.csv", "--kind", "thermal", "--name", "frames")
     assert (said["image"]["frames"], said["image"]["placement"]) == (5, "frames")
+    assert said["image"]["warnings"] == []
     first = stored(conn, "imported_frames")[246]
     chainage, arc = first.places()
     held = np.isfinite(first.values)
     assert np.abs(first.values - temperature(chainage[None], arc[:, None]))[held].max() < 0.05
     assert held[:, chainage > WEST + 0.1].mean() > 0.99
+
+
+def test_frames_that_fit_badly_are_warned_of(example: str, tmp_path: Path) -> None:
+    write(tmp_path / "f.tif", np.ones((200, 500), np.float32), None)
+    rows = [
+        "file,chainage_from,chainage_to,arc_from,arc_to",
+        "f.tif,12310,12320,-2,2",
+        "f.tif,12320,12330,-2,3",
+        "f.tif,0,10,-2,2",
+    ]
+    (tmp_path / "frames.csv").write_text("\n".join(rows), encoding="utf-8")
+    warnings = told("image", "import", NAME, tmp_path / "frames.csv", "--kind", "thermal")["image"]["warnings"]
+    assert "exceeds the survey by" in warnings[0]
+    assert warnings[1] == "1 frame of 3 outside the survey's lining"
+    assert "differ by up to 25 %" in warnings[2]
 
 
 def test_photos_keep_their_colours(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 import psycopg
 
 from tunneldb.arrays import Float
+from tunneldb.counted import counted
 from tunneldb.errors import InputError
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.image_files import Controls, ImageFile, open_image, own_controls, read_controls, read_frames
@@ -18,7 +19,7 @@ from tunneldb.raster.grid import BLOCK, Grid
 from tunneldb.raster.overview import Overview
 from tunneldb.raster.placement.checks import Lining, Placed, check_extent, check_fit, check_placement, scale_error
 from tunneldb.raster.placement.control import ControlFit, fit_control
-from tunneldb.raster.placement.mapping import AffineMapping
+from tunneldb.raster.placement.mapping import AffineMapping, pixel_sides
 from tunneldb.raster.placement.resample import PIXELS, Frame, resample, usual_pixel
 from tunneldb.store.imported_images import ImportedImage, insert_overviews, insert_pixels, replace_imported, section_extent
 from tunneldb.store.survey import Survey
@@ -28,6 +29,9 @@ UNITS = {"thermal": "°C", "photo": "", "radar": "", "moisture": "%", "other": "
 
 TABLES = (".csv", ".txt")
 """Extensions of tables of frames."""
+
+MAX_FRAME_STRETCH = 0.1
+"""Ratio of the sides of a frame's pixels, minus 1, from which there is a warning."""
 
 MAX_BLOCK = 10**8
 """Maximum number of pixels of a block."""
@@ -290,6 +294,14 @@ def _union(frames: Sequence[Frame], lining: Lining) -> Placed:
     west, east, low, high = np.array(each).T
     placed = Placed(float(west.min()), float(east.max()), float(low.min()), float(high.max()))
     check_extent(placed, lining)
+    outside = (east <= lining.chainage_from) | (west >= lining.chainage_to) | (high <= lining.arc_from) | (low >= lining.arc_to)
+    if outside.any():
+        placed.warnings.append(f"{counted(int(outside.sum()), 'frame')} of {len(frames)} outside the survey's lining")
+    ratios = [max(sides) / min(sides) - 1.0 for sides in (pixel_sides(frame.mapping) for frame in frames)]
+    if max(ratios) > MAX_FRAME_STRETCH:
+        placed.warnings.append(
+            f"pixels of a frame differ by up to {100 * max(ratios):.0f} % along and around the tunnel: check chainages and arcs"
+        )
     return placed
 
 
