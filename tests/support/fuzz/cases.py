@@ -138,8 +138,8 @@ UNTRIED = {
 REFUSED = (
     "actions remove", "alarms remove", "clearance", "compare", "elements remove", "evaluate", "export scan-2024",
     "federate add", "federate remove", "findings undo", "ground", "image remove", "intensity", "learn demo-2024",
-    "members demo", "profile remove", "rating change", "rating remove", "register", "run", "serve", "spheres", "survey remove-file",
-    "thickness", "tunnel add {new} {file}", "tunnel find-axis", "tunnel remove",
+    "members demo", "profile remove", "rating change", "rating remove", "register", "run", "serve", "spheres",
+    "survey remove-file", "thickness", "tunnel add {new} {file}", "tunnel find-axis", "tunnel remove",
 )  # fmt: skip
 """What right commands begin with that the survey made by hand has no rows for: they are to say so in one line."""
 
