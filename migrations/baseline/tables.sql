@@ -1214,6 +1214,7 @@ COMMENT ON COLUMN tunnel.ground.geom IS 'The ground from the left to the right, 
 CREATE INDEX ground_survey_id_km_idx ON tunnel.ground (survey_id, km);
 
 CREATE TABLE tunnel.imported_image (
+    id INTEGER GENERATED ALWAYS AS IDENTITY,
     survey_id INTEGER NOT NULL,
     name TEXT NOT NULL,
     kind TEXT NOT NULL,
@@ -1238,7 +1239,8 @@ CREATE TABLE tunnel.imported_image (
     warnings TEXT[] NOT NULL,
     imported_by TEXT DEFAULT CURRENT_USER NOT NULL,
     imported_at TIMESTAMP WITH TIME ZONE DEFAULT now() NOT NULL,
-    CONSTRAINT imported_image_pkey PRIMARY KEY (survey_id, name),
+    CONSTRAINT imported_image_pkey PRIMARY KEY (id),
+    CONSTRAINT imported_image_survey_id_name_key UNIQUE (survey_id, name),
     CONSTRAINT imported_image_kind_check CHECK (kind IN ('thermal', 'photo', 'radar', 'moisture', 'other')),
     CONSTRAINT imported_image_placement_check CHECK (placement IN ('coordinates', 'points', 'frames')),
     CONSTRAINT imported_image_name_check CHECK (name ~ '^[a-z0-9][a-z0-9-]{0,39}$'),
@@ -1247,6 +1249,7 @@ CREATE TABLE tunnel.imported_image (
     CONSTRAINT imported_image_survey_id_fkey FOREIGN KEY(survey_id) REFERENCES tunnel.survey (id) ON DELETE CASCADE
 );
 COMMENT ON TABLE tunnel.imported_image IS 'Images of other instruments, placed in the unrolled plane of a survey; their pixels are blocks of kind imported_NAME in tunnel.image, of a colour image imported_NAME:red, :green and :blue';
+COMMENT ON COLUMN tunnel.imported_image.id IS 'Key';
 COMMENT ON COLUMN tunnel.imported_image.survey_id IS 'Survey that the row belongs to';
 COMMENT ON COLUMN tunnel.imported_image.name IS 'Name within the survey: small letters, digits and hyphens';
 COMMENT ON COLUMN tunnel.imported_image.kind IS 'thermal, photo, radar, moisture or other';

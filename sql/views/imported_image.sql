@@ -2,8 +2,8 @@
 -- (leaks/image.sql), image_tiffs (views/desk.sql).
 
 CREATE OR REPLACE VIEW tunnel_api.imported_image AS
-SELECT i.survey_id, s.name AS survey, i.name, i.kind, 'imported_' || i.name AS image, i.colour, i.unit, i.value_from, i.value_to,
-       i.step, i.pixel, i.placement, i.model, i.frames, i.points, i.outliers, i.residual, i.predicted, i.chainage_from, i.chainage_to,
+SELECT i.id, i.survey_id, s.name AS survey, i.name, i.kind, 'imported_' || i.name AS image, i.colour, i.unit, i.value_from,
+       i.value_to, i.step, i.pixel, i.placement, i.model, i.frames, i.points, i.outliers, i.residual, i.predicted, i.chainage_from, i.chainage_to,
        i.arc_from, i.arc_to, i.source, i.warnings, i.imported_by, i.imported_at
   FROM tunnel.imported_image i
   JOIN tunnel.survey s ON s.id = i.survey_id;

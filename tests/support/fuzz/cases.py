@@ -106,7 +106,7 @@ OF_WORDS: tuple[str, ...] = (
     "alarms add demo {new} --quantity growth --step 50 --warning 0.01 --alarm 0.02",
     "deviation demo-2024 -o {out}.csv", "thickness demo-2024 scan-2024", "evenness demo-2024", "compare demo-2024 scan-2024",
     "clearance demo-2024 --gauge {seeds}/profile.csv --track single", "unroll demo-2024 {seeds}/points.csv",
-    "ground {seeds}/cloud.las -o {out}.laz", "intensity demo-2024 -o {out}.png", "image demo-2024 -o {out}",
+    "ground {seeds}/cloud.las -o {out}.laz", "intensity demo-2024 -o {out}.png", "image write demo-2024 -o {out}",
     "image import demo-2024 {seeds}/strip.tif --kind thermal --pixel 0.1", "image list demo-2024",
     "image remove demo-2024 {new}", "export demo-2024 -o {out}.gpkg", "export demo-2024 -o {out}.dxf",
     "export scan-2024 --classified --copc -o {out}.d", "qgis demo-2024 -o {out}.qgz",
@@ -154,7 +154,7 @@ AFTER_WRITES: tuple[str, ...] = (
     "findings list demo-2024 --state all",
     "findings list demo-2024 -o {out}.gpkg", "run demo-2024 --stale", "batch demo-2024 --preview", "learn demo-2024",
     "evaluate demo-2024 {seeds}/truth.geojson", "export demo-2024 -o {out}.gpkg", "export demo-2024 -o {out}.dxf",
-    "qgis demo-2024 -o {out}.qgz", "report demo-2024 -o {out}.html", "image demo-2024 -o {out}",
+    "qgis demo-2024 -o {out}.qgz", "report demo-2024 -o {out}.html", "image write demo-2024 -o {out}",
     "sections demo-2024 --from 12+300 --to 12+310 --every 5 -o {out}.csv", "axis demo-2024 -o {out}.csv",
     "survey export demo-2024 -o {out}.tdb", "unroll demo-2024 {seeds}/points.csv",
 )  # fmt: skip

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 
-from sqlalchemy import CheckConstraint, text
+from sqlalchemy import CheckConstraint, Identity, UniqueConstraint, text
 from sqlalchemy.orm import Mapped, mapped_column
 
 from tunneldb.database.models.base import NOW, SURVEY, Base, at_most, one_of, parent
@@ -18,6 +18,7 @@ class ImportedImage(Base):
 
     __tablename__ = "imported_image"
     __table_args__ = (
+        UniqueConstraint("survey_id", "name"),
         one_of("kind", *KINDS),
         one_of("placement", *PLACEMENTS),
         CheckConstraint("name ~ '^[a-z0-9][a-z0-9-]{0,39}$'", name="name"),
@@ -29,8 +30,9 @@ class ImportedImage(Base):
         },
     )
 
-    survey_id: Mapped[int] = mapped_column(parent("survey"), primary_key=True, comment=SURVEY)
-    name: Mapped[str] = mapped_column(primary_key=True, comment="Name within the survey: small letters, digits and hyphens")
+    id: Mapped[int] = mapped_column(Identity(always=True), primary_key=True, comment="Key")
+    survey_id: Mapped[int] = mapped_column(parent("survey"), comment=SURVEY)
+    name: Mapped[str] = mapped_column(comment="Name within the survey: small letters, digits and hyphens")
     kind: Mapped[str] = mapped_column(comment="thermal, photo, radar, moisture or other")
     colour: Mapped[bool] = mapped_column(comment="True if it has the bands red, green and blue")
     unit: Mapped[str] = mapped_column(comment="Unit of its values, such as °C; empty without one")
