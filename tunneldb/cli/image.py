@@ -34,7 +34,7 @@ def image() -> None:
     """Write the unrolled images of a survey; import images of other instruments."""
 
 
-@image.command("write", examples=["tunneldb image ringo-2024 -o images --km 511-512"])
+@image.command("write", examples=["tunneldb image write ringo-2024 -o images --km 511-512"])
 @click.argument("survey")
 @click.option(
     "-o",
