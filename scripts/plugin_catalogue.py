@@ -20,7 +20,7 @@ GROUPS = {
     "4 Shape and change": (
         "compare", "axis", "profile add", "deviation", "evenness", "thickness", "rings", "clearance", "intensity",
     ),
-    "5 Hand over": ("qgis", "image", "report", "export", "export --classified"),
+    "5 Hand over": ("qgis", "image write", "report", "export", "export --classified"),
 }  # fmt: skip
 """Commands that are algorithms, by groups of the toolbox, in the order in which one uses them."""
 

@@ -50,13 +50,13 @@ CREATE TABLE tunnel.image (
     block INTEGER NOT NULL,
     tiff BYTEA NOT NULL,
     CONSTRAINT image_pkey PRIMARY KEY (survey_id, km, kind, block),
-    CONSTRAINT image_kind_check CHECK (kind IN ('raw', 'corrected', 'offset', 'rgb', 'state', 'deviation_lining', 'deviation_shotcrete', 'deviation_excavation', 'overview_raw', 'overview_corrected', 'overview_offset', 'overview_rgb', 'overview_state', 'overview_deviation_lining', 'overview_deviation_shotcrete', 'overview_deviation_excavation'))
+    CONSTRAINT image_kind_check CHECK (kind ~ '^(overview_)?(raw|corrected|offset|rgb|state|deviation_lining|deviation_shotcrete|deviation_excavation|imported_[a-z0-9][a-z0-9-]{0,39})$')
 )
  PARTITION BY LIST (survey_id);
 COMMENT ON TABLE tunnel.image IS 'Unrolled images in blocks of 50 m: partition image_s<survey>';
 COMMENT ON COLUMN tunnel.image.survey_id IS 'Survey that the row belongs to';
 COMMENT ON COLUMN tunnel.image.km IS 'Kilometre: floor(chainage / 1000)';
-COMMENT ON COLUMN tunnel.image.kind IS 'raw or corrected intensity, dB, offset from the surface, m, colour (rgb), state of the pixel, or deviation from the design profiles of a layer, m; overview_KIND: the same of a whole kilometre, with pixels of about 0.4 m';
+COMMENT ON COLUMN tunnel.image.kind IS 'raw or corrected intensity, dB, offset from the surface, m, colour (rgb), state of the pixel, or deviation from the design profiles of a layer, m; imported_NAME: an image of another instrument (tunnel.imported_image); overview_KIND: the same of a whole kilometre, with pixels of about 0.4 m';
 COMMENT ON COLUMN tunnel.image.block IS 'Block along the tunnel: floor(chainage / 50); of an overview the first of its kilometre';
 COMMENT ON COLUMN tunnel.image.tiff IS 'GeoTIFF in the unrolled plane (chainage, arc), m';
 
@@ -1212,6 +1212,68 @@ COMMENT ON COLUMN tunnel.ground.arc_left IS 'Arc at which the ground begins on t
 COMMENT ON COLUMN tunnel.ground.arc_right IS 'Arc at which the ground begins on the right, m';
 COMMENT ON COLUMN tunnel.ground.geom IS 'The ground from the left to the right, tunnel''s SRID, m';
 CREATE INDEX ground_survey_id_km_idx ON tunnel.ground (survey_id, km);
+
+CREATE TABLE tunnel.imported_image (
+    id INTEGER GENERATED ALWAYS AS IDENTITY,
+    survey_id INTEGER NOT NULL,
+    name TEXT NOT NULL,
+    kind TEXT NOT NULL,
+    colour BOOLEAN NOT NULL,
+    unit TEXT NOT NULL,
+    value_from DOUBLE PRECISION NOT NULL,
+    value_to DOUBLE PRECISION NOT NULL,
+    step DOUBLE PRECISION NOT NULL,
+    pixel DOUBLE PRECISION NOT NULL,
+    placement TEXT NOT NULL,
+    model TEXT,
+    frames INTEGER NOT NULL,
+    points INTEGER,
+    outliers INTEGER,
+    residual DOUBLE PRECISION,
+    predicted DOUBLE PRECISION,
+    chainage_from DOUBLE PRECISION NOT NULL,
+    chainage_to DOUBLE PRECISION NOT NULL,
+    arc_from DOUBLE PRECISION NOT NULL,
+    arc_to DOUBLE PRECISION NOT NULL,
+    source TEXT NOT NULL,
+    warnings TEXT[] NOT NULL,
+    imported_by TEXT DEFAULT CURRENT_USER NOT NULL,
+    imported_at TIMESTAMP WITH TIME ZONE DEFAULT now() NOT NULL,
+    CONSTRAINT imported_image_pkey PRIMARY KEY (id),
+    CONSTRAINT imported_image_survey_id_name_key UNIQUE (survey_id, name),
+    CONSTRAINT imported_image_kind_check CHECK (kind IN ('thermal', 'photo', 'radar', 'moisture', 'other')),
+    CONSTRAINT imported_image_placement_check CHECK (placement IN ('coordinates', 'points', 'frames')),
+    CONSTRAINT imported_image_name_check CHECK (name ~ '^[a-z0-9][a-z0-9-]{0,39}$'),
+    CONSTRAINT imported_image_unit_at_most_20_characters_check CHECK (char_length(unit) <= 20),
+    CONSTRAINT imported_image_source_at_most_1000_characters_check CHECK (char_length(source) <= 1000),
+    CONSTRAINT imported_image_survey_id_fkey FOREIGN KEY(survey_id) REFERENCES tunnel.survey (id) ON DELETE CASCADE
+);
+COMMENT ON TABLE tunnel.imported_image IS 'Images of other instruments, placed in the unrolled plane of a survey; their pixels are blocks of kind imported_NAME in tunnel.image';
+COMMENT ON COLUMN tunnel.imported_image.id IS 'Key';
+COMMENT ON COLUMN tunnel.imported_image.survey_id IS 'Survey that the row belongs to';
+COMMENT ON COLUMN tunnel.imported_image.name IS 'Name within the survey: small letters, digits and hyphens';
+COMMENT ON COLUMN tunnel.imported_image.kind IS 'thermal, photo, radar, moisture or other';
+COMMENT ON COLUMN tunnel.imported_image.colour IS 'True if it has the bands red, green and blue';
+COMMENT ON COLUMN tunnel.imported_image.unit IS 'Unit of its values, such as °C; empty without one';
+COMMENT ON COLUMN tunnel.imported_image.value_from IS 'Least value of the source, in the unit';
+COMMENT ON COLUMN tunnel.imported_image.value_to IS 'Greatest value of the source, in the unit';
+COMMENT ON COLUMN tunnel.imported_image.step IS 'Size of one stored step, in the unit';
+COMMENT ON COLUMN tunnel.imported_image.pixel IS 'Side of a pixel, m';
+COMMENT ON COLUMN tunnel.imported_image.placement IS 'How it was placed: coordinates (of the file), points (control points), or frames (a table of places)';
+COMMENT ON COLUMN tunnel.imported_image.model IS 'Mapping fitted to control points: similarity, affine or piecewise (along the tunnel); NULL without points';
+COMMENT ON COLUMN tunnel.imported_image.frames IS 'Number of source images';
+COMMENT ON COLUMN tunnel.imported_image.points IS 'Number of control points';
+COMMENT ON COLUMN tunnel.imported_image.outliers IS 'Number of control points that were not used';
+COMMENT ON COLUMN tunnel.imported_image.residual IS 'Root mean square of the residuals of the points that were used, m';
+COMMENT ON COLUMN tunnel.imported_image.predicted IS 'The same of points that are predicted from the others, m; NULL without redundant points';
+COMMENT ON COLUMN tunnel.imported_image.chainage_from IS 'Least chainage of its frame, m';
+COMMENT ON COLUMN tunnel.imported_image.chainage_to IS 'Greatest chainage of its frame, m';
+COMMENT ON COLUMN tunnel.imported_image.arc_from IS 'Least arc of its frame, m, positive right looking up-chainage';
+COMMENT ON COLUMN tunnel.imported_image.arc_to IS 'Greatest arc of its frame, m';
+COMMENT ON COLUMN tunnel.imported_image.source IS 'Name of the file that was imported';
+COMMENT ON COLUMN tunnel.imported_image.warnings IS 'Warnings about its placement';
+COMMENT ON COLUMN tunnel.imported_image.imported_by IS 'Role that imported it';
+COMMENT ON COLUMN tunnel.imported_image.imported_at IS 'Time of the import';
 
 CREATE TABLE tunnel.incoming (
     survey_id INTEGER NOT NULL,

@@ -22,8 +22,13 @@ DECLARE
     block int;
     place record;
 BEGIN
-    IF wanted <> ALL (kinds) THEN
-        RAISE EXCEPTION 'there is no image %: there are %', quote_literal(left(wanted, 40)), array_to_string(kinds, ', ')
+    IF wanted = 'rgb' OR EXISTS (SELECT FROM tunnel.imported_image m
+                                  WHERE m.survey_id = survey_key AND 'imported_' || m.name = wanted AND m.colour) THEN
+        RAISE EXCEPTION 'image % has colours, not values: read its blocks by tunnel_api.image_tiffs', quote_literal(left(wanted, 40))
+            USING ERRCODE = 'invalid_parameter_value';
+    END IF;
+    IF wanted <> ALL (kinds) AND wanted !~ '^imported_' THEN
+        RAISE EXCEPTION 'there is no image %: there are %, imported_NAME', quote_literal(left(wanted, 40)), array_to_string(kinds, ', ')
             USING ERRCODE = 'invalid_parameter_value';
     END IF;
     IF cardinality(x) <> cardinality(y) THEN
@@ -76,7 +81,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.image_values(int, text, float8[], float8[]) IS
-'Values of an unrolled image at places (chainage, arc; m), in their order: dB (raw, corrected), m (offset, deviation_…), or the code of the pixel''s state (state); NULL without a measurement or an image. Reads each block of 50 m once. Needs the extension postgis_raster';
+'Values of an unrolled image at places (chainage, arc; m), in their order: dB (raw, corrected), m (offset, deviation_…), the code of the pixel''s state (state), or the values of an imported image (imported_NAME) in its unit; NULL without a measurement or an image. Reads each block of 50 m once. Needs the extension postgis_raster';
 
 CREATE OR REPLACE FUNCTION tunnel_api.image_value(survey_id int, kind text, chainage float8, arc float8)
 RETURNS float8
@@ -85,7 +90,7 @@ AS $$
     SELECT v.value FROM tunnel_api.image_values($1, $2, ARRAY[$3], ARRAY[$4]) v
 $$;
 COMMENT ON FUNCTION tunnel_api.image_value(int, text, float8, float8) IS
-'Value of an unrolled image (raw, corrected, offset, state, deviation_lining, …) at one place (chainage, arc; m). Each call reads a block of 50 m: for many places use image_values';
+'Value of an unrolled image (raw, corrected, offset, state, deviation_lining, …, imported_NAME) at one place (chainage, arc; m). Each call reads a block of 50 m: for many places use image_values';
 
 
 -- Images are partitioned by survey. A generic plan would open the partitions of all surveys: this function plans for the

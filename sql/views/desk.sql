@@ -39,7 +39,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.image_tiffs(int, text, int[]) IS
-'Blocks of an unrolled image as GeoTIFF in the unrolled plane (chainage, arc; m), by their numbers (image_versions): 16-bit integers with a scale, in dB or m';
+'Blocks of an unrolled image as GeoTIFF in the unrolled plane (chainage, arc; m), by their numbers (image_versions): 16-bit integers with a scale, in dB, m, or the unit of an imported image; red, green and blue of 8 bits of an image in colour';
 
 CREATE OR REPLACE FUNCTION tunnel_api.image_kinds(survey_id int)
 RETURNS SETOF text
@@ -55,7 +55,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.image_kinds(int) IS
-'Kinds of the unrolled images of a survey: raw, corrected, offset, state, deviation_…, and their overviews (image_versions)';
+'Kinds of the unrolled images of a survey: raw, corrected, offset, rgb, state, deviation_…, imported_NAME, and their overviews (image_versions)';
 
 CREATE OR REPLACE FUNCTION tunnel_api.ribbon(survey_id int, chainage_from float8, chainage_to float8, bins int)
 RETURNS TABLE (n int, seen_share float8, wet_area float8, findings jsonb, reviewed int, probability float8,

@@ -101,7 +101,7 @@ def test_a_leak_has_the_same_names_in_json_and_in_files(example: str) -> None:
 
 
 def test_what_is_written_is_named(example: str, tmp_path: Path, conn: psycopg.Connection) -> None:
-    images = told(0, "image", example, "-o", tmp_path / "images")["files"]
+    images = told(0, "image", "write", example, "-o", tmp_path / "images")["files"]
     assert {Path(path).suffix for path in images} == {".tif", ".png"}
     assert sorted(map(str, (tmp_path / "images").iterdir())) == sorted(images)
     leaks = told(0, "leaks", example, "-o", tmp_path / "leaks.csv")

@@ -123,6 +123,12 @@ def test_every_view_begins_with_a_stable_integer_key(
         "INSERT INTO tunnel.image (survey_id, km, kind, block, tiff) SELECT s.id, i.km, i.kind, i.block, i.tiff"
         " FROM tunnel.image i, tunnel.survey s WHERE i.kind = 'offset' AND s.name = 'demo-2023'"
     )
+    conn.execute(
+        "INSERT INTO tunnel.imported_image (survey_id, name, kind, colour, unit, value_from, value_to, step, pixel, placement,"
+        " frames, chainage_from, chainage_to, arc_from, arc_to, source, warnings)"
+        " SELECT id, 'thermal', 'thermal', false, '°C', 8, 20, 0.001, 0.02, 'coordinates', 1, 12310, 12390, -8, 8, 'a.tif',"
+        " '{}' FROM tunnel.survey WHERE name = 'demo-2024'"
+    )
     for view in views(conn):
         with conn.cursor() as cursor:
             cursor.execute(sql.SQL("SELECT * FROM tunnel_api.{}").format(sql.Identifier(view)))

@@ -13,7 +13,7 @@ import psycopg
 from tunneldb.cli.coverage import say_coverage, say_remarks
 from tunneldb.cli.leaks import parse_clock
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import CommandGroup, add_to_json, notify, printable, records
+from tunneldb.cli.output import DefaultGroup, add_to_json, notify, printable, records
 from tunneldb.cli.param_types import FilePath, FiniteRange, WholeRange
 from tunneldb.cli.past import as_of_option, connect_as_of
 from tunneldb.cli.stretch import parse_stretch, stretch_options
@@ -37,20 +37,7 @@ from tunneldb.store.remarks import read_remarks
 from tunneldb.store.survey import Survey, get_survey
 
 
-class _FindingsGroup(CommandGroup):
-    """Its command is ``list`` where none is named: ``tunneldb findings SURVEY``."""
-
-    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        if args and args[0] not in self.commands and args[0] not in ctx.help_option_names:
-            args = ["list", *args]
-        return super().parse_args(ctx, args)
-
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Return a command; what names none is a survey that is to be listed."""
-        return super().get_command(ctx, cmd_name) or super().get_command(ctx, "list")
-
-
-@click.group(cls=_FindingsGroup)
+@click.group(cls=DefaultGroup)
 def findings() -> None:
     """List, export, import or undo findings of all kinds, detected or drawn."""
 

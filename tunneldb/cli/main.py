@@ -92,7 +92,7 @@ GROUPS: dict[str, dict[str, tuple[str, str]]] = {
         "unroll": ("tunneldb.cli.unroll:unroll", "Convert x,y,z to chainage,arc,offset, or back."),
     },
     "Export": {
-        "image": ("tunneldb.cli.image:image", "Write the unrolled images as GeoTIFF."),
+        "image": ("tunneldb.cli.image:image", "Write the unrolled images as GeoTIFF; import images of other instruments."),
         "report": ("tunneldb.cli.report:report", "Write the inspection report as HTML or PDF."),
         "qgis": ("tunneldb.cli.qgis:qgis", "Write a QGIS project with styled layers."),
         "export": ("tunneldb.cli.export:export", "Write a survey as GeoPackage or DXF, or its classified scan files."),

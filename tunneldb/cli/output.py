@@ -158,6 +158,22 @@ class CommandGroup(click.Group):
     command_class = Command
 
 
+class DefaultGroup(CommandGroup):
+    """A group with a command that may be left out: ``tunneldb findings SURVEY`` is ``tunneldb findings list SURVEY``."""
+
+    default = "list"
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Parse arguments, after the name of the default command if they begin with no command."""
+        if args and args[0] not in self.commands and args[0] not in ctx.help_option_names:
+            args = [self.default, *args]
+        return super().parse_args(ctx, args)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Return a command; another word is an argument of the default one."""
+        return super().get_command(ctx, cmd_name) or super().get_command(ctx, self.default)
+
+
 def command(name: str | None = None, cls: type[Command] = Command, **options: Any) -> Callable[[Callable[..., Any]], Command]:
     """Return the decorator that makes a command of a function; options are those of `Command`."""
     return click.command(name, cls=cls, **options)

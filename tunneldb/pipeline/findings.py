@@ -227,7 +227,7 @@ def _shape(
             why = str(error).splitlines()[0]
             raise ValueError(f"{way[0]} is {textwrap.shorten(values[way[0]], 60)!r}, which is not WKT: {why}") from None
     place = [
-        _chainage(conn, survey, name, values[name]) if name.startswith("chainage") else _float(name, values[name])
+        read_chainage(conn, survey, name, values[name]) if name.startswith("chainage") else _float(name, values[name])
         for name in way
     ]
     return shapely.box(place[0], place[2], place[1], place[3]) if len(place) == 4 else shapely.Point(place)
@@ -253,7 +253,7 @@ def _float(name: str, text: str, said: str = "a number") -> float:
     return value
 
 
-def _chainage(conn: psycopg.Connection[Any], survey: Survey, name: str, text: str) -> float:
+def read_chainage(conn: psycopg.Connection[Any], survey: Survey, name: str, text: str) -> float:
     """Return a chainage in metres, given so or as a station of the tunnel, which must exist exactly once."""
     text = text.replace(",", ".")
     if "+" not in text[1:]:

@@ -17,6 +17,12 @@ from tunneldb.arrays import Float, Int16, Single, UInt8
 from tunneldb.compiled import kernel
 from tunneldb.errors import UserError
 
+IMPORTED = "imported_"
+"""Beginning of the kinds of images of other instruments; their names follow."""
+
+OVERVIEW = "overview_"
+"""Beginning of the kinds of overviews."""
+
 KINDS = ("raw", "corrected", "offset")
 """Kinds of the images of a kilometre: raw and corrected intensity (dB), offset from the surface (m)."""
 
@@ -72,18 +78,30 @@ class Raster:
 
 def whole(values: Single, kind: str) -> Int16:
     """Convert values (rows, columns) to steps of :data:`STEP`, NODATA for NaN."""
+    return _steps(values, STEP[kind])
+
+
+def _steps(values: Single, step: float) -> Int16:
     steps = np.empty(values.shape, np.int16)
-    _whole(np.ascontiguousarray(values), 1.0 / STEP[kind], steps)
+    _whole(np.ascontiguousarray(values), 1.0 / step, steps)
     return steps
 
 
 def encode(raster: Raster, kind: str) -> bytes:
-    """Write an image as a GeoTIFF of 16-bit whole numbers, with its scale, unit and nodata value; one in colour in 8 bits.
+    """Write an image of a kind as a GeoTIFF, by its step and unit; an image in colour in 8 bits."""
+    return _encode_colours(raster) if kind == RGB else _encode_values(raster, kind, STEP[kind], UNIT[kind])
+
+
+def encode_imported(raster: Raster, name: str, step: float, unit: str) -> bytes:
+    """Write an imported image as a GeoTIFF, by its step and unit; an image in colour in 8 bits."""
+    return _encode_colours(raster) if raster.values.ndim == 3 else _encode_values(raster, name, step, unit)
+
+
+def _encode_values(raster: Raster, name: str, step: float, unit: str) -> bytes:
+    """Write an image as a GeoTIFF of 16-bit whole numbers, with its scale, unit and nodata value.
 
     The lowest bits are measured noise: fast compression is as good as slow, and differences of neighbours help.
     """
-    if kind == RGB:
-        return _encode_colours(raster)
     rows, columns = raster.values.shape
     profile: dict[str, Any] = {
         "driver": "GTiff",
@@ -101,9 +119,9 @@ def encode(raster: Raster, kind: str) -> bytes:
     }
     with MemoryFile() as memory:
         with memory.open(**profile) as image:
-            image.write(whole(raster.values, kind), 1)
-            image.scales, image.units = (STEP[kind],), (UNIT[kind],)
-            image.set_band_description(1, kind)
+            image.write(_steps(raster.values, step), 1)
+            image.scales, image.units = (step,), (unit,)
+            image.set_band_description(1, name)
         return bytes(memory.read())
 
 
@@ -143,7 +161,7 @@ def whole_colours(values: Single) -> UInt8:
 def decode(tiff: bytes, kind: str = "") -> Raster:
     """Read an image that :func:`encode` wrote.
 
-    An image in colour is read only if its kind, or that of its overview, is given.
+    An image in colour is read only if its kind, or that of its overview, is given. An imported image may have colours.
 
     Bytes of other origin, for example from an archive, are read as GeoTIFF only: a VRT could make GDAL read other files.
 
@@ -155,10 +173,9 @@ def decode(tiff: bytes, kind: str = "") -> Raster:
     with warnings.catch_warnings(), _told():
         warnings.simplefilter("ignore", NotGeoreferencedWarning)
         with MemoryFile(tiff) as memory, memory.open(driver="GTiff") as image:
-            coloured = kind.endswith(RGB)
-            if image.count != (3 if coloured else 1):
+            if image.count not in _bands(kind):
                 raise UserError(f"an image in the database has {image.count} bands; run stage detect again")
-            if coloured:
+            if image.count == 3:
                 bands = np.moveaxis(image.read((1, 2, 3)), 0, 2)
                 return Raster(np.where(bands.any(axis=2, keepdims=True), bands, np.float32(np.nan)), image.transform)
             steps = image.read(1)
@@ -166,6 +183,12 @@ def decode(tiff: bytes, kind: str = "") -> Raster:
             np.multiply(steps, image.scales[0], out=values, casting="same_kind")  # no array of doubles
             values[steps == image.nodata] = np.nan
             return Raster(values, image.transform)
+
+
+def _bands(kind: str) -> tuple[int, ...]:
+    """Return the numbers of bands that an image of a kind, or its overview, may have."""
+    kind = kind.removeprefix(OVERVIEW)
+    return (1, 3) if kind.startswith(IMPORTED) else (3,) if kind == RGB else (1,)
 
 
 @contextmanager
@@ -209,3 +232,8 @@ def _whole(values: Single, per_step: float, steps: Int16) -> None:  # pragma: no
             elif not step > NODATA:  # also if it is NaN
                 step = NODATA + 1.0 if step <= NODATA else float(NODATA)
             steps[i, j] = np.int16(step)
+
+
+def imported_label(name: str, kind: str) -> str:
+    """Return the title of an imported image: of its kind, with its name if that is another."""
+    return f"Imported: {kind}" if name == kind else f"Imported: {kind}, {name}"

@@ -12,9 +12,6 @@ from tunneldb.raster.grid import BLOCK
 PIXEL = 0.4
 """Maximum side of an overview's pixel, m; the image's pixel if that is larger."""
 
-PREFIX = "overview_"
-"""Beginning of the kinds of overviews in the table of images."""
-
 
 def shrink(values: Single, factor: int) -> Single:
     """Average blocks of ``factor`` × ``factor`` pixels, passing over NaNs; the image is filled up to whole blocks.

@@ -15,6 +15,7 @@ from tunneldb.report.clearance import read_clearance
 from tunneldb.report.deviation import read_deviation
 from tunneldb.report.drawing import share_path, step_for, ticks, without_detection
 from tunneldb.report.facts import Facts
+from tunneldb.report.imported import read_images
 from tunneldb.report.location import LocationMap, draw_location
 from tunneldb.report.owner import CHAPTERS
 from tunneldb.report.rating import LISTED_WORST, UNFOLDED, Difference, differences
@@ -228,6 +229,37 @@ class Lining(Chapter):
         return self.facts.strips.length / LETTERS
 
 
+class Imported(_Found):
+    """Images of other instruments."""
+
+    name, style = "imported", "imported.css"
+
+    @cached_property
+    def found(self) -> Any:
+        """Imported images of the stretch."""
+        return read_images(self.facts) if self.name in self.facts.request.owner.chapters else []
+
+    @property
+    def girth(self) -> float:
+        """Height of a strip, m."""
+        return self.facts.strips.north - self.facts.strips.south
+
+    @property
+    def north(self) -> float:
+        """Greatest arc of a strip, m."""
+        return self.facts.strips.north
+
+    @property
+    def length(self) -> float:
+        """Length of a strip, m."""
+        return self.facts.strips.length
+
+    @property
+    def letter(self) -> float:
+        """Height of letters, m."""
+        return self.facts.strips.length / LETTERS
+
+
 class Sections(_Found):
     """Width, height and area of cross-sections."""
 
@@ -413,8 +445,8 @@ class Signatures(Chapter):
 ALL: dict[str, type[Chapter]] = {
     chapter.name: chapter
     for chapter in (
-        Summary, Rating, Actions, Seen, Classes, Lining, Sections, Leaks, Statistics, Findings, Dry, Structures, Underwater,
-        Clearance, Rings, Change, Deviation, Methods, Reviews, Signatures,
+        Summary, Rating, Actions, Seen, Classes, Lining, Imported, Sections, Leaks, Statistics, Findings, Dry, Structures,
+        Underwater, Clearance, Rings, Change, Deviation, Methods, Reviews, Signatures,
     )
 }  # fmt: skip
 """All chapters by name, in their default order."""

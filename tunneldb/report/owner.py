@@ -20,6 +20,7 @@ CHAPTERS = {
     "seen": "Inspected lining",
     "classes": "Waterproofing",
     "lining": "Lining",
+    "imported": "Other instruments",
     "sections": "Cross-sections",
     "leaks": "Leaks",
     "statistics": "Statistics",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, LiteralString
 
 import psycopg
 from psycopg import sql
@@ -59,11 +59,18 @@ def has_results(conn: psycopg.Connection[Any], survey: Survey, km: int) -> bool:
     return row is not None
 
 
+_ONLY: dict[str, LiteralString] = {
+    "finding": " AND origin = 'detected' AND merged_into IS NULL",
+    "image": " AND kind !~ '^(overview_)?imported_'",
+}
+"""Tables of which only some rows are results of a stage, and their condition."""
+
+
 def clear_kilometre(conn: psycopg.Connection[Any], survey: Survey, km: int) -> Work:
     """Delete the results and runs of all stages after ``load`` in a kilometre, and its requests of a batch.
 
     The ledger keeps that points were loaded and are gone, which makes the neighbours' results stale. Findings that people drew
-    stay, and manual edits stay in the audit.
+    and images of other instruments stay, and manual edits stay in the audit.
     """
     lost = work_in(conn, survey, [km])
     tables = conn.execute(
@@ -71,7 +78,7 @@ def clear_kilometre(conn: psycopg.Connection[Any], survey: Survey, km: int) -> W
         " ORDER BY s.step DESC, t.n DESC"
     ).fetchall()
     for (table,) in tables:
-        detected = sql.SQL(" AND origin = 'detected' AND merged_into IS NULL" if table == "finding" else "")
+        detected = sql.SQL(_ONLY.get(table, ""))
         query = sql.SQL("DELETE FROM {} WHERE survey_id = %s AND km = %s{}").format(sql.Identifier("tunnel", table), detected)
         conn.execute(query, [survey.id, km])
     conn.execute("DELETE FROM tunnel.run WHERE survey_id = %s AND km = %s AND stage <> 'load'", [survey.id, km])

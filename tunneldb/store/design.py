@@ -12,8 +12,7 @@ import psycopg
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
 from tunneldb.geometry.stationing import KILOMETRE
-from tunneldb.raster.geotiff import DEVIATION_KINDS
-from tunneldb.raster.overview import PREFIX
+from tunneldb.raster.geotiff import DEVIATION_KINDS, OVERVIEW
 from tunneldb.shape.outline import Outline
 from tunneldb.shape.profile import Profile, Stretch, stretches
 from tunneldb.store.surface import alignment_of
@@ -87,7 +86,7 @@ def remove_profile(conn: psycopg.Connection[Any], tunnel_id: int, tunnel: str, n
     conn.execute(
         "DELETE FROM tunnel.image i USING tunnel.survey s WHERE s.tunnel_id = %s AND i.survey_id = s.id AND i.kind = ANY(%s)"
         " AND (i.km + 1) * %s::float8 > %s AND i.km * %s::float8 < %s",
-        [tunnel_id, [DEVIATION_KINDS[layer], PREFIX + DEVIATION_KINDS[layer]], KILOMETRE, low, KILOMETRE, high],
+        [tunnel_id, [DEVIATION_KINDS[layer], OVERVIEW + DEVIATION_KINDS[layer]], KILOMETRE, low, KILOMETRE, high],
     )
     conn.execute(
         "DELETE FROM tunnel.design_profile WHERE tunnel_id = %s AND name = %s AND layer = %s", [tunnel_id, name, layer]

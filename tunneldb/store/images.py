@@ -21,9 +21,9 @@ from tunneldb.radiometry.reference_curve import ReferenceCurve
 from tunneldb.radiometry.robust_statistics import DryLevel
 from tunneldb.radiometry.roughness import Roughness
 from tunneldb.raster.accumulator import Window
-from tunneldb.raster.geotiff import RGB, Raster, decode, encode
+from tunneldb.raster.geotiff import OVERVIEW, RGB, Raster, decode, encode
 from tunneldb.raster.grid import BLOCKS, Grid
-from tunneldb.raster.overview import PREFIX, Overview
+from tunneldb.raster.overview import Overview
 from tunneldb.raster.state import PixelState
 from tunneldb.store.survey import Survey
 
@@ -108,9 +108,9 @@ class ImageStore:
         columns = window.columns
         block = grid.first_block + columns.start // grid.block_columns
         if not self._blocks:  # only now: what makes the images takes long, and others look at those that are there
-            # Deviation is not made here: it stays, stale, with its sections.
+            # Deviation is not made here: it stays, stale, with its sections. Images of other instruments stay, too.
             self.conn.execute(
-                "DELETE FROM tunnel.image WHERE survey_id = %s AND km = %s AND kind NOT LIKE '%%deviation%%'",
+                "DELETE FROM tunnel.image WHERE survey_id = %s AND km = %s AND kind !~ '^(overview_)?(deviation|imported)_'",
                 (self.survey.id, grid.km),
             )
         self.pixels += int(np.count_nonzero(window.weight))
@@ -156,7 +156,7 @@ def save_overview(conn: psycopg.Connection[Any], survey: Survey, km: int, overvi
     """Add the overview of a kilometre, if it has blocks; the former one must be deleted before."""
     raster = overview.raster()
     if raster is not None:
-        insert_image(conn, survey, km, PREFIX + overview.kind, km * BLOCKS, encode(raster, overview.kind))
+        insert_image(conn, survey, km, OVERVIEW + overview.kind, km * BLOCKS, encode(raster, overview.kind))
 
 
 def _values(window: Window, kind: str) -> Single:

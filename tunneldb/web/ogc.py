@@ -12,9 +12,10 @@ from tunneldb.numerals import parse_number
 from tunneldb.raster.tiles import EDGE, SIZE, ZOOMS
 from tunneldb.store.desk import features
 from tunneldb.store.desk.features import Layer
-from tunneldb.store.desk.images import KINDS, image_kinds
+from tunneldb.store.desk.images import images
 from tunneldb.store.desk.surveys import list_surveys
 from tunneldb.web.route import Call, NotFoundError
+from tunneldb.web.sessions import Connection
 from tunneldb.web.surveys import survey_of
 
 CONFORMANCE = [
@@ -109,9 +110,9 @@ def tile_sets(call: Call) -> Any:
     """Return the images of all surveys as sets of tiles."""
     with call.session.connection() as conn:
         sets = [
-            _tile_set(survey["name"], kind)
+            _tile_set(survey["name"], kind, label)
             for survey in list_surveys(conn)
-            for kind in [*image_kinds(conn, survey["id"]), "findings"]
+            for kind, label in _sets(conn, survey["id"]).items()
         ]
     return {"tilesets": sets}
 
@@ -121,17 +122,23 @@ def tile_set(call: Call) -> Any:
     kind = call.path["kind"]
     with call.session.connection() as conn:
         survey = survey_of(conn, call.path["survey"])
-        if kind not in [*image_kinds(conn, survey.id), "findings"]:
+        label = _sets(conn, survey.id).get(kind)
+        if label is None:
             raise NotFoundError(f"survey {survey.name} has no image of kind {kind[:40]!r}")
-    return _tile_set(survey.name, kind)
+    return _tile_set(survey.name, kind, label)
 
 
-def _tile_set(survey: str, kind: str) -> dict[str, Any]:
+def _sets(conn: Connection, survey_id: int) -> dict[str, str]:
+    """Return the kinds of tiles of a survey with their labels."""
+    return {**{image.kind: image.label.lower() for image in images(conn, survey_id)}, "findings": "findings"}
+
+
+def _tile_set(survey: str, kind: str, label: str) -> dict[str, Any]:
     vector = kind == "findings"
     suffix, media = ("mvt", "application/vnd.mapbox-vector-tile") if vector else ("png", "image/png")
     template = f"/tiles/{survey}/{kind}/{{tileMatrix}}/{{tileCol}}/{{tileRow}}.{suffix}"
     return {
-        "title": f"{survey}: findings" if vector else f"{survey}: {KINDS[kind][0].lower()}",
+        "title": f"{survey}: {label}",
         "dataType": "vector" if vector else "map",
         "crs": f"/tileMatrixSets/{MATRIX_SET}",
         "tileMatrixSetURI": f"/tileMatrixSets/{MATRIX_SET}",

@@ -11,7 +11,7 @@ from tunneldb.errors import UserError
 from tunneldb.export.images.tile_png import is_signed
 from tunneldb.finding_kind import FindingKind
 from tunneldb.store.desk import surveys
-from tunneldb.store.desk.images import KINDS, image_kinds
+from tunneldb.store.desk.images import KINDS, find_image, images
 from tunneldb.store.desk.surveys import Place
 from tunneldb.web.route import Call, NotFoundError
 from tunneldb.web.sessions import Connection
@@ -75,8 +75,8 @@ def one(call: Call) -> Any:
         low, high = measured(survey)
         ends = surveys.arcs(conn, survey.id) or (0.0, 0.0)
         kinds = [
-            {"kind": kind, "label": KINDS[kind][0], "unit": KINDS[kind][1], "signed": is_signed(kind)}
-            for kind in image_kinds(conn, survey.id)
+            {"kind": image.kind, "label": image.label, "unit": image.unit, "signed": is_signed(image.kind)}
+            for image in images(conn, survey.id)
         ]
         return {
             "id": survey.id, "name": survey.name, "tunnel": survey.tunnel, "date": survey.date, "from": low, "to": high,
@@ -100,10 +100,11 @@ def summary(call: Call) -> Any:
 def colours(call: Call) -> Any:
     """Return the values of the darkest and the brightest colour of an image."""
     kind = call.path["kind"]
-    if kind not in KINDS:
-        raise no_kind(kind)
     with call.session.connection() as conn:
-        stretch = survey_stretch(call.desk.blocks, conn, survey_of(conn, call.path["survey"]), kind)
+        survey = survey_of(conn, call.path["survey"])
+        if find_image(conn, survey.id, kind) is None:
+            raise no_kind(kind)
+        stretch = survey_stretch(call.desk.blocks, conn, survey, kind)
     return {"low": stretch.low, "high": stretch.high}
 
 

@@ -8,9 +8,9 @@ from collections.abc import Hashable, Mapping
 import numpy as np
 
 from tunneldb.export.images.preview import OFFSET_SPANS
-from tunneldb.export.images.tile_png import Stretch, is_signed
+from tunneldb.export.images.tile_png import Stretch, imported_stretch, is_signed
 from tunneldb.raster.colour_sums import FULL
-from tunneldb.raster.geotiff import RGB, Raster
+from tunneldb.raster.geotiff import IMPORTED, Raster
 from tunneldb.raster.grid import BLOCK, BLOCKS
 from tunneldb.raster.overview import PIXEL
 from tunneldb.raster.tiles import Tile, reduce
@@ -70,8 +70,6 @@ def _kept(cache: BlockCache, keys: Mapping[int, Hashable]) -> dict[int, Raster]:
 
 def survey_stretch(cache: BlockCache, conn: Connection, survey: Place, kind: str) -> Stretch:
     """Return the values of the darkest and the brightest colour of a survey's image, from its overviews."""
-    if kind == RGB:
-        return Stretch(0.0, FULL)
     whole = (int(np.floor((survey.low or 0.0) / BLOCK)) - BLOCKS, int(np.ceil((survey.high or 0.0) / BLOCK)))
     images, tag = _images(cache, conn, survey.id, kind, overview_of(kind), whole, PIXEL)
     known = cache.stretches.get(tag)
@@ -81,11 +79,15 @@ def survey_stretch(cache: BlockCache, conn: Connection, survey: Place, kind: str
 
 
 def _stretch(images: list[Raster], kind: str) -> Stretch:
+    if any(image.values.ndim == 3 for image in images):
+        return Stretch(0.0, FULL)
     step = max(1, sum(image.values.size for image in images) // SAMPLE)
     values = np.concatenate([np.empty(0, np.float32), *(image.values.ravel()[::step] for image in images)])
     shown = values[np.isfinite(values)]
     if not len(shown):
         return Stretch(0.0, 1.0)
+    if kind.startswith(IMPORTED):
+        return imported_stretch(shown)
     if is_signed(kind):
         reach = float(np.percentile(np.abs(shown), 90.0))
         span = next((s for s in OFFSET_SPANS if s >= reach), OFFSET_SPANS[-1])

@@ -10,7 +10,7 @@ from tunneldb.errors import UserError
 from tunneldb.export.images.tile_png import tile_png
 from tunneldb.raster.tiles import Tile, display
 from tunneldb.store.desk.findings import finding_tile
-from tunneldb.store.desk.images import KINDS
+from tunneldb.store.desk.images import find_image
 from tunneldb.web.route import Call, NotFoundError
 from tunneldb.web.surveys import no_kind, survey_of
 from tunneldb.web.tile_source import survey_stretch, tile_images
@@ -25,10 +25,11 @@ REVALIDATE = "private, no-cache"
 def image_tile(call: Call) -> Response:
     """Return a tile of an image; 304 if the browser has it."""
     kind, tile = call.path["kind"], tile_of(call, "png")
-    if kind not in KINDS:
-        raise no_kind(kind)
     with call.session.connection() as conn:
         survey = survey_of(conn, call.path["survey"])
+        image = find_image(conn, survey.id, kind)
+        if image is None:
+            raise no_kind(kind)
         images, tag = tile_images(call.desk.blocks, conn, survey, kind, tile)
         headers = {"ETag": f'"{tag}"', "Cache-Control": REVALIDATE}
         if call.headers.get("if-none-match") == headers["ETag"]:
@@ -36,7 +37,8 @@ def image_tile(call: Call) -> Response:
         if not images:
             return Response(status_code=204, headers=headers)
         stretch = survey_stretch(call.desk.blocks, conn, survey, kind)
-    return Response(tile_png(display(tile, images, kind == "state"), kind, stretch), media_type="image/png", headers=headers)
+    content = tile_png(display(tile, images, kind == "state"), image.palette, stretch)
+    return Response(content, media_type="image/png", headers=headers)
 
 
 def vector_tile(call: Call) -> Response:

@@ -72,6 +72,9 @@ OF_FILES: tuple[tuple[str, str], ...] = (
     ("elements.csv", "elements add demo {new} --file {file}"),
     ("rating.toml", "rating add {file}"),
     ("actions.csv", "actions import demo {file}"),
+    ("strip.tif", "image import demo-2024 {file} --kind thermal --pixel 0.1"),
+    ("image-points.csv", "image import demo-2024 {seeds}/strip.tif --kind thermal --pixel 0.1 --points {file}"),
+    ("frames.csv", "image import demo-2024 {file} --kind thermal --pixel 0.1"),
 )
 """Files, and what reads them: each command and option that takes a file is among them."""
 
@@ -103,8 +106,9 @@ OF_WORDS: tuple[str, ...] = (
     "alarms add demo {new} --quantity growth --step 50 --warning 0.01 --alarm 0.02",
     "deviation demo-2024 -o {out}.csv", "thickness demo-2024 scan-2024", "evenness demo-2024", "compare demo-2024 scan-2024",
     "clearance demo-2024 --gauge {seeds}/profile.csv --track single", "unroll demo-2024 {seeds}/points.csv",
-    "ground {seeds}/cloud.las -o {out}.laz", "intensity demo-2024 -o {out}.png", "image demo-2024 -o {out}",
-    "export demo-2024 -o {out}.gpkg", "export demo-2024 -o {out}.dxf",
+    "ground {seeds}/cloud.las -o {out}.laz", "intensity demo-2024 -o {out}.png", "image write demo-2024 -o {out}",
+    "image import demo-2024 {seeds}/strip.tif --kind thermal --pixel 0.1", "image list demo-2024",
+    "image remove demo-2024 {new}", "export demo-2024 -o {out}.gpkg", "export demo-2024 -o {out}.dxf",
     "export scan-2024 --classified --copc -o {out}.d", "qgis demo-2024 -o {out}.qgz",
     "report demo-2024 -o {out}.html --from 12310 --to 12320",
     "register scan-2024 {seeds}/points.csv --ladders {seeds}/ladders.csv --up +z --water-level 600",
@@ -133,9 +137,9 @@ UNTRIED = {
 
 REFUSED = (
     "actions remove", "alarms remove", "clearance", "compare", "elements remove", "evaluate", "export scan-2024",
-    "federate add", "federate remove", "findings undo", "ground", "intensity", "learn demo-2024", "members demo",
-    "profile remove", "rating change", "rating remove", "register", "run", "serve", "spheres", "survey remove-file",
-    "thickness", "tunnel add {new} {file}", "tunnel find-axis", "tunnel remove",
+    "federate add", "federate remove", "findings undo", "ground", "image remove", "intensity", "learn demo-2024",
+    "members demo", "profile remove", "rating change", "rating remove", "register", "run", "serve", "spheres",
+    "survey remove-file", "thickness", "tunnel add {new} {file}", "tunnel find-axis", "tunnel remove",
 )  # fmt: skip
 """What right commands begin with that the survey made by hand has no rows for: they are to say so in one line."""
 
@@ -150,7 +154,7 @@ AFTER_WRITES: tuple[str, ...] = (
     "findings list demo-2024 --state all",
     "findings list demo-2024 -o {out}.gpkg", "run demo-2024 --stale", "batch demo-2024 --preview", "learn demo-2024",
     "evaluate demo-2024 {seeds}/truth.geojson", "export demo-2024 -o {out}.gpkg", "export demo-2024 -o {out}.dxf",
-    "qgis demo-2024 -o {out}.qgz", "report demo-2024 -o {out}.html", "image demo-2024 -o {out}",
+    "qgis demo-2024 -o {out}.qgz", "report demo-2024 -o {out}.html", "image write demo-2024 -o {out}",
     "sections demo-2024 --from 12+300 --to 12+310 --every 5 -o {out}.csv", "axis demo-2024 -o {out}.csv",
     "survey export demo-2024 -o {out}.tdb", "unroll demo-2024 {seeds}/points.csv",
 )  # fmt: skip
@@ -201,7 +205,7 @@ def make_case(seed: int, number: int, ground: Ground, folder: Path) -> Case:
         return Case(_words(DRIP, server=ground.server, **names), "photo from a server that drips", kind, "ines", statement)
     if kind == "file":
         name, command = chance.choice(OF_FILES)
-        text = Path(name).suffix not in {".las", ".laz", ".e57", ".tdb"}
+        text = Path(name).suffix not in {".las", ".laz", ".e57", ".tdb", ".tif"}
         data, wrong = mutate(chance, (seeds / name).read_bytes(), text=text)
         path = folder / name
         path.write_bytes(data)

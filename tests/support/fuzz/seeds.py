@@ -8,6 +8,8 @@ from pathlib import Path
 import ezdxf
 import laspy
 import numpy as np
+import rasterio
+from affine import Affine
 
 from support.e57_files import Scan, write
 from tunneldb.geometry.surface import Surface
@@ -88,6 +90,7 @@ def write_seeds(folder: Path, axis: np.ndarray, surface: Surface) -> None:
     _drawing(folder / "axis.dxf", axis)
     _outline(folder / "profile.dxf")
     _truth(folder / "truth.geojson")
+    _images(folder)
     for sample in ("j-landxml.xml", "indot-twin-branch.xml", "aplitop-3.ifc", "indot-twin-branch.ifc"):
         (folder / sample).write_bytes((DATA / sample).read_bytes())
 
@@ -146,3 +149,20 @@ def _truth(path: Path) -> None:
     shape = {"type": "Polygon", "coordinates": [ring]}
     feature = {"type": "Feature", "properties": {"kind": "leak", "area": 1.0}, "geometry": shape}
     path.write_text(json.dumps({"type": "FeatureCollection", "features": [feature]}))
+
+
+def _images(folder: Path) -> None:
+    """A thermal image in chainage and arc, its control points, and a table that has it as a frame."""
+    values = (10 + np.arange(60 * 200) % 97 / 10).reshape(1, 60, 200).astype(np.float32)
+    with rasterio.open(
+        folder / "strip.tif", "w", driver="GTiff", width=200, height=60, count=1, dtype="float32",
+        transform=Affine(0.1, 0.0, 12320.0, 0.0, -0.1, 3.0),
+    ) as image:  # fmt: skip
+        image.write(values)
+        image.units = ("°C",)
+    points = [(10, 10), (190, 12), (100, 55), (15, 50), (180, 48)]
+    _write(
+        folder / "image-points.csv",
+        "column,row,chainage,arc\n" + "\n".join(f"{c},{r},{12320 + 0.1 * c:.3f},{3 - 0.1 * r:.3f}" for c, r in points),
+    )
+    _write(folder / "frames.csv", f"file,chainage_from,chainage_to,arc_from,arc_to\n{folder / 'strip.tif'},12320,12340,-3,3\n")

@@ -6,7 +6,7 @@ import datetime as dt
 from typing import Any
 
 from geoalchemy2 import WKBElement
-from sqlalchemy import BigInteger, Computed, Identity, Index, Text, text
+from sqlalchemy import BigInteger, CheckConstraint, Computed, Identity, Index, Text, text
 from sqlalchemy.dialects.postgresql import ARRAY
 from sqlalchemy.orm import Mapped, mapped_column
 
@@ -198,22 +198,10 @@ class Image(Base):
 
     __tablename__ = "image"
     __table_args__ = (
-        one_of(
-            "kind",
-            *(
-                f"{prefix}{kind}"
-                for prefix in ("", "overview_")
-                for kind in (
-                    "raw",
-                    "corrected",
-                    "offset",
-                    "rgb",
-                    "state",
-                    "deviation_lining",
-                    "deviation_shotcrete",
-                    "deviation_excavation",
-                )
-            ),
+        CheckConstraint(
+            "kind ~ '^(overview_)?(raw|corrected|offset|rgb|state|deviation_lining|deviation_shotcrete|deviation_excavation"
+            "|imported_[a-z0-9][a-z0-9-]{0,39})$'",
+            name="kind",
         ),
         {
             "comment": "Unrolled images in blocks of 50 m: partition image_s<survey>",
@@ -226,7 +214,8 @@ class Image(Base):
     kind: Mapped[str] = mapped_column(
         primary_key=True,
         comment="raw or corrected intensity, dB, offset from the surface, m, colour (rgb), state of the pixel, or deviation "
-        "from the design profiles of a layer, m; overview_KIND: the same of a whole kilometre, with pixels of about 0.4 m",
+        "from the design profiles of a layer, m; imported_NAME: an image of another instrument (tunnel.imported_image); "
+        "overview_KIND: the same of a whole kilometre, with pixels of about 0.4 m",
     )
     block: Mapped[int] = mapped_column(
         primary_key=True,

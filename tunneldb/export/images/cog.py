@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from rasterio.windows import Window
 
 from tunneldb.export.images.palette import PALETTES
 from tunneldb.pointcloud.points import COLOURS
-from tunneldb.raster.geotiff import RGB, UNIT
+from tunneldb.raster.geotiff import UNIT
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,17 @@ class Extent:
     columns: int
 
 
-def write_cog(path: Path, kind: str, extent: Extent, blocks: Iterable[tuple[int, NDArray[Any]]], name: str = "") -> None:
+def write_cog(
+    path: Path,
+    kind: str,
+    extent: Extent,
+    blocks: Iterable[tuple[int, NDArray[Any]]],
+    name: str = "",
+    *,
+    colour: bool = False,
+    unit: str | None = None,
+    tags: Mapping[str, str] | None = None,
+) -> None:
     """Write an image; places without a block are empty (GDAL fills them with the nodata value).
 
     Parameters
@@ -44,36 +54,43 @@ def write_cog(path: Path, kind: str, extent: Extent, blocks: Iterable[tuple[int,
     path : Path
         File to write.
     kind : str
-        Intensities and offset are written in single precision, NaN for nothing; classes and states in 8 bits with a
-        colour table; colours in 8 bits with opacity.
+        Values are written in single precision, NaN for nothing; classes and states in 8 bits with a colour table; colours in
+        8 bits with opacity.
     extent : Extent
         Place and size of the image.
     blocks : iterable of (int, (rows, columns) array)
         First column and pixels of each block; (rows, columns, 4) for colours.
     name : str
         Name of the band, if not its kind.
+    colour : bool
+        True if the blocks are colours.
+    unit : str, optional
+        Unit of the values, if the kind is not one of the survey's own images.
+    tags : mapping of str to str, optional
+        Metadata of the file.
     """
     plain = path.with_name(f"plain-{path.name}")
     palette = PALETTES.get(kind)
-    if kind == RGB:
+    if colour:
         nodata, bands, options = None, 4, {"photometric": "RGB", "alpha": "YES", "interleave": "pixel"}
     else:
         nodata, bands, options = palette.nodata if palette else np.nan, 1, {}
     with rasterio.open(
         plain, "w", driver="GTiff", height=extent.rows, width=extent.columns, count=bands, transform=extent.transform,
-        dtype="uint8" if palette or kind == RGB else "float32", nodata=nodata,
+        dtype="uint8" if palette or colour else "float32", nodata=nodata,
         tiled=True, blockxsize=256, blockysize=256, bigtiff="if_safer", **options,
     ) as image:  # fmt: skip
-        if kind == RGB:
-            for band, colour in enumerate((*COLOURS, "opacity"), start=1):
-                image.set_band_description(band, colour)
+        if colour:
+            for band, what in enumerate((*COLOURS, "opacity"), start=1):
+                image.set_band_description(band, what)
         else:
             image.set_band_description(1, name or kind)
         if palette:
             image.write_colormap(1, {code: (*colour, 255) for code, (_, colour) in palette.entries.items()})
             image.update_tags(1, **{f"{kind.upper()}_{code}": name for code, (name, _) in palette.entries.items()})
-        elif kind != RGB:
-            image.units = (UNIT[kind],)
+        elif not colour:
+            image.units = (UNIT[kind] if unit is None else unit,)
+        image.update_tags(**(tags or {}))
         for column, pixels in blocks:
             bands_of = np.moveaxis(np.atleast_3d(pixels), 2, 0)
             image.write(bands_of, window=Window(column, 0, pixels.shape[1], extent.rows))

@@ -18,8 +18,9 @@ from tunneldb.database import snapshot
 from tunneldb.export.images import preview
 from tunneldb.export.images.class_raster import ClassPainter
 from tunneldb.export.images.cog import Extent, write_cog
+from tunneldb.export.images.imported import export_imported
 from tunneldb.export.images.palette import PALETTES
-from tunneldb.export.images.tile_png import coloured
+from tunneldb.export.images.tile_png import opaque
 from tunneldb.export.images.underwater import export_bed, export_submerged
 from tunneldb.files import replacing
 from tunneldb.geometry.stationing import KILOMETRE
@@ -47,7 +48,7 @@ def export_kilometre(conn: psycopg.Connection, survey: Survey, km: int, folder: 
     0 without a point; or red, green, blue and opacity, if points have colours. x is the chainage and y the arc, m. Each file
     appears when complete. Classes exist if stage ground has run: they are computed from the offset image and the results of
     that stage. Deviation is written for each layer that the survey was compared with. If sonar scans were loaded, the bed and
-    their unrolled points are written too.
+    their unrolled points are written too. Imported images are written as ``SURVEY-kmNNN-imported-NAME.tif``.
 
     Returns
     -------
@@ -61,7 +62,7 @@ def export_kilometre(conn: psycopg.Connection, survey: Survey, km: int, folder: 
             for path in _export_kind(conn, survey, km, kind, folder)
         ]
         below = (export(conn, survey, km, folder) for export in (export_submerged, export_bed))
-        return [*written, *(path for path in below if path is not None)]
+        return [*written, *(path for path in below if path is not None), *export_imported(conn, survey, km, folder)]
 
 
 def export_filled(conn: psycopg.Connection, survey: Survey, km: int, folder: Path) -> list[Path]:
@@ -126,7 +127,7 @@ def _export_kind(conn: psycopg.Connection, survey: Survey, km: int, kind: str, f
     tiff, png = folder / f"{stem}.tif", folder / f"{stem}.png"
     sheet = _Sheet(extent.transform.a)
     with replacing(tiff) as temporary:
-        write_cog(temporary, kind, extent, _pixels(conn, survey, km, stored, blocks, painter, sheet))
+        write_cog(temporary, kind, extent, _pixels(conn, survey, km, stored, blocks, painter, sheet), colour=kind == RGB)
     leaks = _leaks(conn, survey, km) if kind == "corrected" else []
     with replacing(png) as temporary:
         title = f"{survey.name}  km {km}  {_TITLES[kind]}"
@@ -195,7 +196,7 @@ def _pixels(
             pixels = pixels.astype(np.uint8, copy=False)
         sheet.note(raster.transform.c, pixels)
         if kind == RGB:
-            pixels = coloured(raster.values)
+            pixels = opaque(raster.values)
         yield (block - blocks[0]) * pixels.shape[1], pixels
 
 

@@ -12,6 +12,12 @@ Colour = tuple[int, int, int]
 BLUE, WHITE, RED = (33, 102, 172), (247, 247, 247), (178, 24, 43)
 """Colours of the least, the middle and the greatest value of images whose values have a sign."""
 
+RAMPS: dict[str, tuple[Colour, ...]] = {
+    "thermal": ((0, 0, 4), (87, 16, 110), (188, 55, 84), (249, 142, 9), (252, 255, 164)),
+    "moisture": ((247, 251, 255), (198, 219, 239), (107, 174, 214), (33, 113, 181), (8, 48, 107)),
+}
+"""Colours of imported images by kind, from the least to the greatest value, at equal distances: inferno, ColorBrewer Blues."""
+
 COLOURS: dict[PointClass, Colour] = {
     PointClass.UNASSIGNED: (176, 176, 176),
     PointClass.GROUND: (166, 129, 76),

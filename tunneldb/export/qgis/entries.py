@@ -26,7 +26,17 @@ from tunneldb.export.qgis.layer import (
     UNROLLED,
     VectorLayer,
 )
-from tunneldb.export.qgis.raster import BED, FILLED, KINDS, SUBMERGED, image_kind, pipe
+from tunneldb.export.qgis.raster import (
+    BED,
+    FILLED,
+    KINDS,
+    SUBMERGED,
+    image_kind,
+    imported_name,
+    imported_pipe,
+    imported_title,
+    pipe,
+)
 from tunneldb.export.qgis.rating_style import rating_renderer
 from tunneldb.export.qgis.source import RECOMPUTED_FROM, Source, recompute
 from tunneldb.export.qgis.styles import style_elements
@@ -160,7 +170,8 @@ def image_entries(images: Sequence[Path], folder: Path | None, crs: ET.Element) 
     """Return the layers of the images, a group for each kind.
 
     The first kind is visible, and images of sonar scans are. An image lies above the same image with filled gaps. Theme
-    Deviation shows the deviation from the innermost layer of the design, theme Change shows the change.
+    Deviation shows the deviation from the innermost layer of the design, theme Change shows the change. Imported images
+    follow, a group for each, hidden at first.
     """
     entries = []
     of_kind = {kind: sorted(path for path in images if image_kind(path) == kind) for kind in KINDS}
@@ -170,22 +181,33 @@ def image_entries(images: Sequence[Path], folder: Path | None, crs: ET.Element) 
         paths = of_kind[kind]
         drawn = pipe(kind, of_kind[kind.removesuffix(FILLED)])
         for path in paths:
-            element = ET.Element("maplayer", type="raster", styleCategories="AllStyleCategories")
-            ET.SubElement(element, "id").text = layer_id(path.stem)
-            ET.SubElement(element, "datasource").text = _path(path, folder)
-            ET.SubElement(element, "layername").text = path.stem
-            ET.SubElement(element, "srs").append(deepcopy(crs) if kind == BED else no_crs())
-            ET.SubElement(element, "provider").text = "gdal"
-            element.append(deepcopy(drawn))
-            ET.SubElement(element, "blendMode").text = "0"
             if kind == BED:
-                entries.append(Entry(layer_id(path.stem), path.stem, (UNDERWATER, title), (MAP,), element))
+                entries.append(_image_entry(path, folder, (UNDERWATER, title), (MAP,), drawn, crs))
                 continue
             themes: tuple[str, ...] = (UNROLLED, SHEETS, FINDINGS) if kind.removesuffix(FILLED) in shown else ()
             themes += (DEVIATION,) if kind.removesuffix(FILLED) == design else ()
             themes += (CHANGE,) if kind == CHANGE_KIND else ()
-            entries.append(Entry(layer_id(path.stem), path.stem, (UNROLLED, title), themes, element))
+            entries.append(_image_entry(path, folder, (UNROLLED, title), themes, drawn, None))
+    for name in sorted({name for path in images if (name := imported_name(path)) is not None}):
+        paths = sorted(path for path in images if imported_name(path) == name)
+        drawn, title = imported_pipe(paths), imported_title(paths)
+        entries += [_image_entry(path, folder, (UNROLLED, title), (), drawn, None) for path in paths]
     return entries
+
+
+def _image_entry(
+    path: Path, folder: Path | None, group: tuple[str, ...], themes: tuple[str, ...], drawn: ET.Element, crs: ET.Element | None
+) -> Entry:
+    """Return the layer of an image; without a coordinate system it is in the unrolled plane."""
+    element = ET.Element("maplayer", type="raster", styleCategories="AllStyleCategories")
+    ET.SubElement(element, "id").text = layer_id(path.stem)
+    ET.SubElement(element, "datasource").text = _path(path, folder)
+    ET.SubElement(element, "layername").text = path.stem
+    ET.SubElement(element, "srs").append(no_crs() if crs is None else deepcopy(crs))
+    ET.SubElement(element, "provider").text = "gdal"
+    element.append(deepcopy(drawn))
+    ET.SubElement(element, "blendMode").text = "0"
+    return Entry(layer_id(path.stem), path.stem, group, themes, element)
 
 
 def _path(path: Path, folder: Path | None) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,9 +11,10 @@ import numpy as np
 import rasterio
 
 from tunneldb.arrays import Float
-from tunneldb.export.images.palette import PALETTES, hexadecimal
+from tunneldb.export.images.palette import PALETTES, RAMPS, hexadecimal
+from tunneldb.export.images.tile_png import imported_stretch
 from tunneldb.raster.gap_fill import FILL_NOTE
-from tunneldb.raster.geotiff import CHANGE, DEVIATION_KINDS, RGB
+from tunneldb.raster.geotiff import CHANGE, DEVIATION_KINDS, RGB, imported_label
 from tunneldb.raster.grey import grey_range
 
 FILLED = "-filled"
@@ -55,9 +57,18 @@ _DEPTH = 2  # band of the depth in a raster of the bed
 _SAMPLE = 1000
 
 
+_IMPORTED = re.compile(r"-km-?\d+-imported-([a-z0-9-]+)")
+
+
+def imported_name(path: Path) -> str | None:
+    """Return the name of an imported image by its file name, None if it is no imported image."""
+    found = _IMPORTED.search(path.stem)
+    return None if found is None or found.end() != len(path.stem) else found[1]
+
+
 def image_kind(path: Path) -> str | None:
-    """Return the kind of an image by its file name, None if it is no image of the lining."""
-    return next((kind for kind in KINDS if path.stem.endswith(kind)), None)
+    """Return the kind of an image by its file name, None if it is no image of the lining by the survey itself."""
+    return None if imported_name(path) else next((kind for kind in KINDS if path.stem.endswith(kind)), None)
 
 
 def offset_range(paths: Sequence[Path], ranges: Sequence[float] = OFFSET_RANGES) -> float:
@@ -95,11 +106,8 @@ def pipe(kind: str, paths: Sequence[Path]) -> ET.Element:
     darker the deeper. An image in colour has its own colours.
     """
     element = ET.Element("pipe")
-    alpha = "-1"
     if kind == RGB:
-        renderer, alpha = ET.SubElement(element, "rasterrenderer", type="multibandcolor"), "4"
-        renderer.attrib.update({"redBand": "1", "greenBand": "2", "blueBand": "3"})
-        _origin(renderer)
+        renderer = _colours(element)
     elif kind in PALETTES:
         renderer = ET.SubElement(element, "rasterrenderer", type="paletted", band="1")
         entries = ET.SubElement(renderer, "colorPalette")
@@ -115,18 +123,66 @@ def pipe(kind: str, paths: Sequence[Path]) -> ET.Element:
         named = zip(np.linspace(shallow, deep, len(_DEPTH_COLOURS)).tolist(), _DEPTH_COLOURS, strict=True)
         renderer = _ramp(element, _DEPTH, [(depth, f"{depth:.2f} m", colour) for depth, colour in named])
     else:
-        limits = grey_range(_sample(paths))
-        renderer = ET.SubElement(element, "rasterrenderer", type="singlebandgray", grayBand="1", gradient="BlackToWhite")
-        _origin(renderer)
-        enhancement = ET.SubElement(renderer, "contrastEnhancement")
-        ET.SubElement(enhancement, "minValue").text = f"{limits[0]:.3f}"
-        ET.SubElement(enhancement, "maxValue").text = f"{limits[1]:.3f}"
-        ET.SubElement(enhancement, "algorithm").text = "StretchToMinimumMaximum"
-    renderer.attrib.update({"opacity": "1", "alphaBand": alpha, "nodataColor": ""})
+        renderer = _greys(element, grey_range(_sample(paths)))
+    return _finished(element, renderer, smooth=kind not in PALETTES)
+
+
+def imported_title(paths: Sequence[Path]) -> str:
+    """Return the title of the group of an imported image: kind, name and unit."""
+    tags = _tags(paths[0])
+    unit = tags.get("TUNNELDB_UNIT")
+    return imported_label(imported_name(paths[0]) or "", tags.get("TUNNELDB_KIND", "other")) + (f", {unit}" if unit else "")
+
+
+def imported_pipe(paths: Sequence[Path]) -> ET.Element:
+    """Return the element with the style of an imported image: its colours, or values in the ramp of their kind or in grey."""
+    with rasterio.open(paths[0]) as image:
+        colour = image.count > 1
+    tags = _tags(paths[0])
+    ramp = RAMPS.get(tags.get("TUNNELDB_KIND", ""))
+    element = ET.Element("pipe")
+    if colour:
+        return _finished(element, _colours(element), smooth=True)
+    stretch = imported_stretch(_sample(paths))
+    if ramp is None:
+        return _finished(element, _greys(element, (stretch.low, stretch.high)), smooth=True)
+    unit = f" {tags.get('TUNNELDB_UNIT', '')}".rstrip()
+    places = np.linspace(stretch.low, stretch.high, len(ramp)).tolist()
+    stops = [(value, f"{value:.3g}{unit}", hexadecimal(rgb)) for value, rgb in zip(places, ramp, strict=True)]
+    return _finished(element, _ramp(element, 1, stops), smooth=True)
+
+
+def _tags(path: Path) -> dict[str, str]:
+    with rasterio.open(path) as image:
+        return dict(image.tags())
+
+
+def _colours(element: ET.Element) -> ET.Element:
+    """Draw the bands red, green, blue and opacity; returns the renderer."""
+    renderer = ET.SubElement(element, "rasterrenderer", type="multibandcolor", redBand="1", greenBand="2", blueBand="3")
+    renderer.set("alphaBand", "4")
+    _origin(renderer)
+    return renderer
+
+
+def _greys(element: ET.Element, limits: tuple[float, float]) -> ET.Element:
+    """Draw the first band in grey between two values; returns the renderer."""
+    renderer = ET.SubElement(element, "rasterrenderer", type="singlebandgray", grayBand="1", gradient="BlackToWhite")
+    _origin(renderer)
+    enhancement = ET.SubElement(renderer, "contrastEnhancement")
+    ET.SubElement(enhancement, "minValue").text = f"{limits[0]:.3f}"
+    ET.SubElement(enhancement, "maxValue").text = f"{limits[1]:.3f}"
+    ET.SubElement(enhancement, "algorithm").text = "StretchToMinimumMaximum"
+    return renderer
+
+
+def _finished(element: ET.Element, renderer: ET.Element, *, smooth: bool) -> ET.Element:
+    """Add what a style has besides its renderer; returns the element."""
+    renderer.attrib.update({"opacity": "1", "alphaBand": renderer.get("alphaBand", "-1"), "nodataColor": ""})
     ET.SubElement(element, "brightnesscontrast", brightness="0", contrast="0", gamma="1")
     ET.SubElement(element, "huesaturation", saturation="0", colorizeOn="0", grayscaleMode="0")
     resampler = ET.SubElement(element, "rasterresampler", maxOversampling="2")
-    if kind not in PALETTES:
+    if smooth:
         resampler.set("zoomedOutResampler", "bilinear")
     return element
 

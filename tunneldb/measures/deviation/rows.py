@@ -10,9 +10,9 @@ import psycopg
 
 from tunneldb.arrays import Bool
 from tunneldb.measures.deviation.compute import Step
-from tunneldb.raster.geotiff import DEVIATION_KINDS, Raster, encode
+from tunneldb.raster.geotiff import DEVIATION_KINDS, OVERVIEW, Raster, encode
 from tunneldb.raster.grid import BLOCK
-from tunneldb.raster.overview import PREFIX, Overview
+from tunneldb.raster.overview import Overview
 from tunneldb.raster.state import shows_lining
 from tunneldb.store.images import image_blocks, insert_image, load_kinds, save_overview
 from tunneldb.store.survey import Survey
@@ -38,7 +38,7 @@ def replace_image(conn: psycopg.Connection[Any], survey: Survey, km: int, layer:
     """Replace the image of a kilometre's deviation from a layer; blocks that show nothing are left out."""
     kind = DEVIATION_KINDS[layer]
     conn.execute(
-        "DELETE FROM tunnel.image WHERE survey_id = %s AND km = %s AND kind = ANY(%s)", [survey.id, km, [kind, PREFIX + kind]]
+        "DELETE FROM tunnel.image WHERE survey_id = %s AND km = %s AND kind = ANY(%s)", [survey.id, km, [kind, OVERVIEW + kind]]
     )
     overview = Overview(kind)
     for raster in blocks:

@@ -8,8 +8,7 @@ from typing import Any
 
 import psycopg
 
-from tunneldb.raster.geotiff import RGB, Raster, decode
-from tunneldb.raster.overview import PREFIX
+from tunneldb.raster.geotiff import IMPORTED, OVERVIEW, RGB, Raster, decode, imported_label
 
 KINDS = {
     "corrected": ("Corrected intensity", "dB"),
@@ -40,10 +39,56 @@ class Block:
     version: int
 
 
+@dataclass(frozen=True)
+class ImageKind:
+    """Image of a survey as the desk shows it.
+
+    Attributes
+    ----------
+    kind : str
+        Its kind: one of :data:`KINDS`, or ``imported_NAME``.
+    label, unit : str
+        Title and unit.
+    palette : str
+        Kind by which it is coloured: the kind itself, or that of an imported image, as ``thermal``.
+    """
+
+    kind: str
+    label: str
+    unit: str
+    palette: str
+
+
 def image_kinds(conn: psycopg.Connection[Any], survey_id: int) -> list[str]:
-    """Return the kinds of images of a survey in the order of :data:`KINDS`, without overviews."""
+    """Return the kinds of images of a survey in the order of :data:`KINDS`, without overviews; imported images come last."""
+    return [image.kind for image in images(conn, survey_id)]
+
+
+def images(conn: psycopg.Connection[Any], survey_id: int) -> list[ImageKind]:
+    """Return the images of a survey in the order of :data:`KINDS`; imported images come last."""
     stored = {kind for (kind,) in conn.execute("SELECT k FROM tunnel_api.image_kinds(%s) AS k", [survey_id])}
-    return [kind for kind in KINDS if kind in stored]
+    own = [_own(kind) for kind in KINDS if kind in stored]
+    return [*own, *_imported(conn, survey_id)] if any(kind.startswith(IMPORTED) for kind in stored) else own
+
+
+def find_image(conn: psycopg.Connection[Any], survey_id: int, kind: str) -> ImageKind | None:
+    """Return the image of a kind, which may have no blocks; None if there is no such kind."""
+    if kind in KINDS:
+        return _own(kind)
+    if not kind.startswith(IMPORTED):
+        return None
+    return next((image for image in _imported(conn, survey_id) if image.kind == kind), None)
+
+
+def _own(kind: str) -> ImageKind:
+    return ImageKind(kind, *KINDS[kind], kind)
+
+
+def _imported(conn: psycopg.Connection[Any], survey_id: int) -> list[ImageKind]:
+    rows = conn.execute(
+        "SELECT name, kind, unit FROM tunnel_api.imported_image WHERE survey_id = %s ORDER BY name", [survey_id]
+    )
+    return [ImageKind(IMPORTED + name, imported_label(name, kind), unit, kind) for name, kind, unit in rows]
 
 
 def blocks(conn: psycopg.Connection[Any], survey_id: int, kind: str, first: int, last: int) -> list[Block]:
@@ -65,4 +110,4 @@ def load_blocks(
 
 def overview_of(kind: str) -> str:
     """Return the kind of the overview of an image."""
-    return PREFIX + kind
+    return OVERVIEW + kind

@@ -1,0 +1,1 @@
+"""Images of other instruments in the unrolled plane: placement, checks and resampling."""
