@@ -2435,6 +2435,31 @@ COMMENT ON COLUMN tunnel.boundary_region.finding_id IS 'Finding that it is a par
 CREATE INDEX boundary_region_finding_id_idx ON tunnel.boundary_region (finding_id);
 CREATE INDEX boundary_region_survey_id_km_idx ON tunnel.boundary_region (survey_id, km);
 
+CREATE TABLE tunnel.finding_image (
+    id BIGINT GENERATED ALWAYS AS IDENTITY,
+    finding_id BIGINT NOT NULL,
+    imported_image_id INTEGER,
+    outline_key TEXT NOT NULL,
+    mean DOUBLE PRECISION NOT NULL,
+    surroundings DOUBLE PRECISION NOT NULL,
+    spread DOUBLE PRECISION NOT NULL,
+    share DOUBLE PRECISION NOT NULL,
+    CONSTRAINT finding_image_pkey PRIMARY KEY (id),
+    CONSTRAINT finding_image_finding_id_fkey FOREIGN KEY(finding_id) REFERENCES tunnel.finding (id) ON DELETE CASCADE,
+    CONSTRAINT finding_image_imported_image_id_fkey FOREIGN KEY(imported_image_id) REFERENCES tunnel.imported_image (id) ON DELETE CASCADE
+);
+COMMENT ON TABLE tunnel.finding_image IS 'Values of other images than the intensity under findings, and around them: the image in colour of the scan, and imported images';
+COMMENT ON COLUMN tunnel.finding_image.id IS 'Key';
+COMMENT ON COLUMN tunnel.finding_image.finding_id IS 'Finding';
+COMMENT ON COLUMN tunnel.finding_image.imported_image_id IS 'Imported image; NULL for the image in colour of the scan';
+COMMENT ON COLUMN tunnel.finding_image.outline_key IS 'Key of the outline that was measured: the values are of no other one';
+COMMENT ON COLUMN tunnel.finding_image.mean IS 'Mean under the outline, in the image''s unit; of colours, lightness L*';
+COMMENT ON COLUMN tunnel.finding_image.surroundings IS 'Median of the lining around it, in the same unit';
+COMMENT ON COLUMN tunnel.finding_image.spread IS 'Standard deviation there, from the median absolute deviation';
+COMMENT ON COLUMN tunnel.finding_image.share IS 'Share of the pixels under the outline that have values, 0 to 1';
+CREATE UNIQUE INDEX finding_image_finding_idx ON tunnel.finding_image (finding_id, COALESCE(imported_image_id, 0));
+CREATE INDEX finding_image_imported_image_id_idx ON tunnel.finding_image (imported_image_id);
+
 CREATE TABLE tunnel.photo (
     id BIGINT GENERATED ALWAYS AS IDENTITY,
     finding_id BIGINT NOT NULL,

@@ -110,6 +110,8 @@ def _lines(facts: Dict[str, Any], probability: float | None) -> List[str]:
         lines.append(darker)
     if facts["evidence"]:
         lines.append(str(facts["evidence"]))
+    if facts["other_images"]:
+        lines.append(str(facts["other_images"]))
     if facts["reviewed_by"]:
         lines.append(f"reviewed by {facts['reviewed_by']}, {facts['reviewed_at']}")
     if facts["photos"]:

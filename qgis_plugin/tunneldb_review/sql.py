@@ -26,7 +26,7 @@ PERSON = (
 
 _LISTED = (
     "id", "km", "chainage_from", "chainage_to", "arc_from", "arc_to", "kind", "kind_detected", "confidence", "area",
-    "review", "counted"
+    "review", "counted", "other_contrast"
 )  # fmt: skip
 # dates and lists as text, so that what is read does not depend on how QGIS turns types into Python's
 _FACTS = {
@@ -34,7 +34,7 @@ _FACTS = {
     **{name: f"f.{name}" for name in ("darkening_mean", "darkening_max", "contrast", "image_share", "photos")},
     "reviewed_at": "to_char(f.reviewed_at, 'YYYY-MM-DD HH24:MI')",
     "reasons": "array_to_string(f.reasons, ', ')",
-    "evidence": "f.evidence",
+    "evidence": "f.evidence", "other_images": "f.other_images",
     "outline": "public.ST_AsText(f.unrolled, 3)",
     "map_west": "public.ST_XMin(f.map)", "map_south": "public.ST_YMin(f.map)",
     "map_east": "public.ST_XMax(f.map)", "map_north": "public.ST_YMax(f.map)",

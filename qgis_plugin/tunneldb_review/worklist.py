@@ -30,6 +30,7 @@ class Finding:
     area: float
     review: str
     counted: bool = True
+    other_contrast: Optional[float] = None
 
     @property
     def probability(self) -> float:
@@ -38,6 +39,11 @@ class Finding:
             return 1.0 if self.kind in ("leak", "drip") else 0.0
         return self.confidence if self.kind_detected == "leak" else 1.0 - self.confidence
 
+    @property
+    def contrast_elsewhere(self) -> float:
+        """Greatest contrast in other images, in standard deviations; -1 if none shows it."""
+        return -1.0 if self.other_contrast is None else self.other_contrast
+
 
 ORDERS: Dict[str, Tuple[str, Callable[[Finding], Tuple[float, ...]]]] = {
     "likely": ("Most probable leak first", lambda f: (-f.probability, f.chainage_from)),
@@ -45,6 +51,7 @@ ORDERS: Dict[str, Tuple[str, Callable[[Finding], Tuple[float, ...]]]] = {
     "doubtful": ("Most doubtful first", lambda f: (abs(f.probability - 0.5), f.chainage_from)),
     "large": ("Largest first", lambda f: (-f.area, f.chainage_from)),
     "chainage": ("By chainage", lambda f: (f.chainage_from, f.arc_from)),
+    "images": ("Greatest contrast in other images first", lambda f: (-f.contrast_elsewhere, f.chainage_from)),
 }
 """Orders by name: title, and sort key."""
 

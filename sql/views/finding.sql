@@ -96,6 +96,13 @@ SELECT a.id, a.survey_id, s.name AS survey, a.km,
            AS state,
        (SELECT count(*) FROM tunnel.photo p WHERE p.finding_id = a.id) AS photos,
        tunnel_internal.evidence_text(a.evidence) AS evidence, a.model, a.superseded,
+       (SELECT string_agg(coalesce(i.name, 'rgb') || ' '
+                          || tunnel_internal.contrast_words(v.mean - v.surroundings, i.unit, i.colour IS NOT FALSE), ', '
+                          ORDER BY i.name NULLS FIRST)
+          FROM tunnel.finding_image v LEFT JOIN tunnel.imported_image i ON i.id = v.imported_image_id
+         WHERE v.finding_id = a.id AND v.outline_key = tunnel_internal.outline_key(a.unrolled)) AS other_images,
+       (SELECT max(abs(v.mean - v.surroundings) / nullif(v.spread, 0)) FROM tunnel.finding_image v
+         WHERE v.finding_id = a.id AND v.outline_key = tunnel_internal.outline_key(a.unrolled)) AS other_contrast,
        (public.st_xmin(coalesce(a.shape_surface, a.surface)) + public.st_xmax(coalesce(a.shape_surface, a.surface))) / 2 AS easting,
        (public.st_ymin(coalesce(a.shape_surface, a.surface)) + public.st_ymax(coalesce(a.shape_surface, a.surface))) / 2 AS northing,
        (public.st_zmin(coalesce(a.shape_surface, a.surface)) + public.st_zmax(coalesce(a.shape_surface, a.surface))) / 2 AS height,
@@ -166,6 +173,8 @@ BEGIN
         ('state', 'open, confirmed, rejected, gone (not detected again), dry (in a dry region), same or merged (another is included instead)'),
         ('photos', 'Number of photos (finding_photo)'),
         ('evidence', 'Evidence for a leak and against it in words, with logarithms of odds, the strongest first; NULL for a drawn finding'),
+        ('other_images', 'Differences from the lining around it in other images, such as thermal -0.8 K (finding_image); NULL if none shows it, or it was redrawn since'),
+        ('other_contrast', 'Greatest of these differences in standard deviations of the lining around it'),
         ('model', 'Version of the model of evidence that classified it'),
         ('superseded', 'True if another finding (merged_into, same_as) or a dry region replaces it'),
         ('unrolled', 'Geometry in the unrolled plane (chainage, arc), m, SRID 0'),
@@ -223,6 +232,13 @@ SELECT a.id, a.survey_id, s.name AS survey, a.km,
        a.detected AND a.review <> 'rejected' AS counted,
        tunnel_internal.evidence_text(a.evidence) AS evidence, a.model, a.wet, a.origin, a.severity,
        v.label AS severity_label, a.drawn_by, a.drawn_at,
+       (SELECT string_agg(coalesce(i.name, 'rgb') || ' '
+                          || tunnel_internal.contrast_words(v.mean - v.surroundings, i.unit, i.colour IS NOT FALSE), ', '
+                          ORDER BY i.name NULLS FIRST)
+          FROM tunnel.finding_image v LEFT JOIN tunnel.imported_image i ON i.id = v.imported_image_id
+         WHERE v.finding_id = a.id AND v.outline_key = tunnel_internal.outline_key(a.unrolled)) AS other_images,
+       (SELECT max(abs(v.mean - v.surroundings) / nullif(v.spread, 0)) FROM tunnel.finding_image v
+         WHERE v.finding_id = a.id AND v.outline_key = tunnel_internal.outline_key(a.unrolled)) AS other_contrast,
        (public.st_xmin(coalesce(a.shape_surface, a.surface)) + public.st_xmax(coalesce(a.shape_surface, a.surface))) / 2 AS easting,
        (public.st_ymin(coalesce(a.shape_surface, a.surface)) + public.st_ymax(coalesce(a.shape_surface, a.surface))) / 2 AS northing,
        (public.st_zmin(coalesce(a.shape_surface, a.surface)) + public.st_zmax(coalesce(a.shape_surface, a.surface))) / 2 AS height,
@@ -275,6 +291,8 @@ BEGIN
         ('wet', 'True if its kind counts as wet: those are in the views of leaks'),
         ('origin', 'Origin of its outline: detected, drawn, redrawn, split or merged'),
         ('evidence', 'Evidence for a leak and against it in words, with logarithms of odds, the strongest first'),
+        ('other_images', 'Differences from the lining around it in other images, such as thermal -0.8 K (finding_image); NULL if none shows it, or it was redrawn since'),
+        ('other_contrast', 'Greatest of these differences in standard deviations of the lining around it'),
         ('model', 'Version of the model of evidence that classified it'),
         ('severity', 'Severity, 1 (lowest) to 4; edited in the views of findings'),
         ('severity_label', 'Name of the severity'),

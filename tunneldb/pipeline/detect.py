@@ -31,6 +31,7 @@ from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
 from tunneldb.pipeline.calibration import UNKNOWN, Calibration, calibrate, dry_sigma
 from tunneldb.pipeline.detection_notes import describe, pixel_note
+from tunneldb.pipeline.other_images import measure_kilometre
 from tunneldb.pipeline.replace_findings import replace_findings
 from tunneldb.pointcloud.colour_depth import colour_depth
 from tunneldb.pointcloud.points import Points
@@ -351,6 +352,7 @@ def _save(
     )
     if result.background.count:
         save_measured(conn, inputs.drawn, result.drawn)
+    measure_kilometre(conn, survey, km)
     network = usable(inputs.network, result.grid.pixel)
     notes = [
         *colour_notes(inputs, result.counts),

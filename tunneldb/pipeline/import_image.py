@@ -15,6 +15,7 @@ from tunneldb.counted import counted
 from tunneldb.errors import InputError
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.image_files import Controls, ImageFile, open_image, own_controls, read_controls, read_frames
+from tunneldb.pipeline.other_images import measure_under_findings
 from tunneldb.raster.grid import BLOCK, Grid
 from tunneldb.raster.overview import Overview
 from tunneldb.raster.placement.checks import Lining, Placed, check_extent, check_fit, check_placement, scale_error
@@ -178,6 +179,7 @@ def import_image(
         advance(1)
     if not blocks:
         raise InputError(f"{path}: the image has no values within the lining of survey {survey.name}")
+    measure_under_findings(conn, survey, -np.inf, np.inf, image.image_kind)
     conn.commit()
     return ImportedResult(image, replaced, found, blocks, done.points, done.notes)
 

@@ -31,7 +31,7 @@ TABLE = [
         "confidence",
     ),
     *("imageShare", "review", "by", "at", "remark", "detected", "strip", "kind", "origin", "severity", "severityLabel"),
-    *("easting", "northing", "height"),
+    *("easting", "northing", "height", "otherImages", "otherContrast"),
 ]
 """Columns of the table, as in the page's script."""
 
@@ -64,8 +64,9 @@ def leak_table(facts: Facts) -> Markup:
 
 
 def _as_finding(facts: Facts, key: int) -> tuple[Any, ...]:
-    """Return name of the kind, origin, severity and its name, and the coordinates (m) of a leak."""
+    """Return name of the kind, origin, severity and its name, coordinates (m), and other images of a leak."""
     assert facts.findings is not None  # leaks are findings
     finding = facts.findings.by_id[key]
     place = (round(value, 3) for value in (finding.easting, finding.northing, finding.height))
-    return finding.kind_label, finding.origin, finding.severity, finding.severity_label or "", *place
+    others = finding.other_images or "", text.rounded(finding.other_contrast, 1)
+    return finding.kind_label, finding.origin, finding.severity, finding.severity_label or "", *place, *others

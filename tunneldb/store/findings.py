@@ -62,6 +62,8 @@ class Finding:
     contrast: float | None
     image_share: float | None
     confidence: float | None
+    other_images: str | None
+    other_contrast: float | None
     review: str
     state: str
     detected: bool

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 
-from sqlalchemy import CheckConstraint, Identity, UniqueConstraint, text
+from sqlalchemy import BigInteger, CheckConstraint, Identity, Index, UniqueConstraint, text
 from sqlalchemy.orm import Mapped, mapped_column
 
 from tunneldb.database.models.base import NOW, SURVEY, Base, at_most, one_of, parent
@@ -61,3 +61,28 @@ class ImportedImage(Base):
     warnings: Mapped[list[str]] = mapped_column(comment="Warnings about its placement")
     imported_by: Mapped[str] = mapped_column(server_default=text("CURRENT_USER"), comment="Role that imported it")
     imported_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="Time of the import")
+
+
+class FindingImage(Base):
+    """Values of another image than the intensity under a finding, and around it."""
+
+    __tablename__ = "finding_image"
+    __table_args__ = (
+        Index("finding_image_finding_idx", "finding_id", text("COALESCE(imported_image_id, 0)"), unique=True),
+        Index(None, "imported_image_id"),
+        {
+            "comment": "Values of other images than the intensity under findings, and around them: the image in colour of the "
+            "scan, and imported images"
+        },
+    )
+
+    id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
+    finding_id: Mapped[int] = mapped_column(parent("finding"), comment="Finding")
+    imported_image_id: Mapped[int | None] = mapped_column(
+        parent("imported_image"), comment="Imported image; NULL for the image in colour of the scan"
+    )
+    outline_key: Mapped[str] = mapped_column(comment="Key of the outline that was measured: the values are of no other one")
+    mean: Mapped[float] = mapped_column(comment="Mean under the outline, in the image's unit; of colours, lightness L*")
+    surroundings: Mapped[float] = mapped_column(comment="Median of the lining around it, in the same unit")
+    spread: Mapped[float] = mapped_column(comment="Standard deviation there, from the median absolute deviation")
+    share: Mapped[float] = mapped_column(comment="Share of the pixels under the outline that have values, 0 to 1")

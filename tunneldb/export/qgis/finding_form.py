@@ -29,7 +29,8 @@ _ALIASES = {
     "detected_at": "Last detected", "also_detected": "Also detected", "detected_as": "Detected as", "parent_id": "Split off",
     "merged_into": "Merged into", "merged": "Merged into this", "same_as": "Same as", "dry_region_id": "In dry region",
     "counted": "Included in totals", "state": "State", "photos": "Photos", "evidence": "Evidence for and against a leak",
-    "model": "Classified by model", "easting": "Easting (m)", "northing": "Northing (m)", "height": "Height (m)",
+    "model": "Classified by model", "other_images": "In other images", "other_contrast": "Contrast there (sigma)",
+    "easting": "Easting (m)", "northing": "Northing (m)", "height": "Height (m)",
     "superseded": "Superseded", CLOCK_TEXT: "Clock position",
 }  # fmt: skip
 _PHOTO_ALIASES = {
@@ -38,7 +39,8 @@ _PHOTO_ALIASES = {
 }  # fmt: skip
 _DECIMALS = {
     "chainage_from": 3, "chainage_to": 3, "arc_from": 2, "arc_to": 2, "clock": 1, "length": 2, "area": 3, "darkening_mean": 1,
-    "darkening_max": 1, "image_share": 2, "contrast": 1, "confidence": 2, "easting": 2, "northing": 2, "height": 2,
+    "darkening_max": 1, "image_share": 2, "contrast": 1, "confidence": 2, "other_contrast": 1, "easting": 2, "northing": 2,
+    "height": 2,
 }  # fmt: skip
 _MOMENTS = ("reviewed_at", "drawn_at", "created_at", "detected_at", "added_at")
 _SAVED = '"label" IS NOT NULL'
@@ -48,7 +50,8 @@ _REVIEWS = {"Open": "open", "Confirmed": "confirmed", "Rejected": "rejected"}
 _FACTS = (
     "id", "label", CLOCK_TEXT, "state", "area", "length", "origin", "drawn_by", "drawn_at", "reviewed_by", "reviewed_at",
     "measured",
-    "darkening_mean", "darkening_max", "image_share", "kind_detected", "confidence", "reasons", "also_detected", "merged",
+    "darkening_mean", "darkening_max", "image_share", "other_images", "other_contrast", "kind_detected", "confidence",
+    "reasons", "also_detected", "merged",
     "merged_into",
     "same_as",
     "parent_id", "dry_region_id", "segment", "chainage_from", "chainage_to", "arc_from", "arc_to", "easting", "northing",

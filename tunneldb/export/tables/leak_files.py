@@ -28,7 +28,7 @@ COLUMNS = {
 }
 """Columns of the files and keys of JSON, and the attribute of a finding that each has: programs rely on these names."""
 
-ADDED = ("severity", "severity_label", "remark", "easting", "northing", "height")
+ADDED = ("severity", "severity_label", "remark", "easting", "northing", "height", "other_images", "other_contrast")
 """Further columns, after the geometry, so that the position of the others stays."""
 
 _ATTRIBUTE = COLUMNS | {name: name for name in ADDED}

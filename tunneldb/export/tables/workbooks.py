@@ -24,6 +24,7 @@ _PLACE = (
     (Column("Easting, m", _METRES), "easting"), (Column("Northing, m", _METRES), "northing"),
     (Column("Height, m", _METRES), "height"),
 )  # fmt: skip
+_IMAGES = ((Column("Other images"), "other_images"), (Column("Contrast there, σ", "0.0"), "other_contrast"))
 _FINDING = (
     (Column("No.", _WHOLE), "id"), (Column("Chainage"), "label"), (Column("Chainage from, m", _METRES), "chainage_from"),
     (Column("Chainage to, m", _METRES), "chainage_to"), (Column("Arc from, m", _METRES), "arc_from"),
@@ -37,7 +38,7 @@ _FINDING = (
     (Column("Drawn by"), "drawn_by"), (Column("Drawn, UTC"), "drawn_at"), (Column("Reviewed by"), "reviewed_by"),
     (Column("Reviewed, UTC"), "reviewed_at"), (Column("Mean drop, dB", "0.0"), "darkening_mean"),
     (Column("Confidence", "0.00"), "confidence"), (Column("Photos", _WHOLE), "photos"), (Column("Remark"), "remark"),
-    *_PLACE,
+    *_PLACE, *_IMAGES,
 )  # fmt: skip
 _LEAK = (
     (Column("No.", _WHOLE), "id"), (Column("Chainage"), "label"), (Column("Chainage from, m", _METRES), "chainage_from"),
@@ -49,7 +50,7 @@ _LEAK = (
     (Column("Review"), "review"), (Column("Found again"), "detected"), (Column("Counted"), "counted"),
     (Column("Reviewed by"), "reviewed_by"), (Column("Reviewed, UTC"), "reviewed_at"), (Column("Reasons"), "reasons"),
     (Column("Severity", _WHOLE), "severity"), (Column("Severity in words"), "severity_label"), (Column("Remark"), "remark"),
-    *_PLACE,
+    *_PLACE, *_IMAGES,
 )  # fmt: skip
 
 _NAMES = {"leak": "Leaks", "joint": "Joints", "dark": "Dry dark areas", "all": "Leaks, joints, dry dark areas"}

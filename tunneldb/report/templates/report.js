@@ -44,6 +44,7 @@
     ["Darkening dB", "drop", (l) => fixed(l.drop, 1), "n minor"],
     ["Contrast σ", "contrast", (l) => fixed(l.contrast, 1), "n minor"],
     ["Confidence", "confidence", (l) => fixed(l.confidence, 2), "n minor"],
+    ...(leaks.some((leak) => leak.otherImages) ? [["Other images", "otherContrast", (l) => l.otherImages || "–", "minor"]] : []),
     ...(leaks.some((leak) => leak.severity) ? [["Severity", "severity", (l) => _(l.severityLabel), "minor"]] : []),
     ["Review", "review", review, ""],
     ["By", "by", (l) => l.by, "minor"],
@@ -79,7 +80,7 @@
   }
 
   function sortBy(key) {
-    state.up = state.sort === key ? !state.up : !["area", "drop", "contrast", "confidence", "length"].includes(key);
+    state.up = state.sort === key ? !state.up : !["area", "drop", "contrast", "confidence", "length", "otherContrast"].includes(key);
     state.sort = key;
     state.page = 0;
     show();
@@ -183,6 +184,7 @@
       [_("Darkening, mean and greatest"), `${fixed(leak.drop, 1)}, ${fixed(leak.dropMax, 1)} dB`], [_("Contrast"), `${fixed(leak.contrast, 1)} σ`],
       [_("Confidence"), fixed(leak.confidence, 2)], [_("Measured"), leak.imageShare === null ? _("not yet") : _("{share} % of it", { share: Math.round(100 * leak.imageShare) })],
     ];
+    if (leak.otherImages) facts.push([_("Other images"), leak.otherImages]);
     facts.push([_("E, N, H m"), coordinates(leak)]);
     const list = make("dl", {}, ...facts.map(([term, value]) => make("div", {}, make("dt", {}, term), make("dd", {}, value))));
     if (leak.by) list.append(make("div", { class: "long" }, make("dt", {}, _("Reviewed")), make("dd", {}, _("{state} by {who}, {when}", { state: _(leak.review), who: leak.by, when: leak.at }))));

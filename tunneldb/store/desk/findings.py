@@ -22,6 +22,7 @@ ORDERS = {
     "doubtful": "abs(probability - 0.5), chainage_from, id",
     "large": "area DESC, chainage_from, id",
     "chainage": "chainage_from, arc_from, id",
+    "images": "other_contrast DESC NULLS LAST, chainage_from, id",
 }
 """Orders of the work list, as in the QGIS plugin."""
 
@@ -36,7 +37,7 @@ def worklist(
     rows = conn.execute(
         sql.SQL(
             "SELECT * FROM (SELECT f.id, f.kind, f.review, f.chainage_from, f.chainage_to, f.arc_from, f.arc_to,"
-            " tunnel_api.leak_probability(f.kind_detected, f.confidence, f.wet) AS probability, f.area"
+            " tunnel_api.leak_probability(f.kind_detected, f.confidence, f.wet) AS probability, f.area, f.other_contrast"
             " FROM tunnel_api.finding f WHERE f.survey_id = %s AND f.state IN ('open', 'confirmed', 'rejected', 'gone')"
             " AND f.chainage_to > %s AND f.chainage_from < %s AND f.area >= %s AND (%s OR f.kind = ANY(%s))) f"
             " ORDER BY {} LIMIT {}"
@@ -52,7 +53,7 @@ def finding(conn: psycopg.Connection[Any], finding_id: int) -> dict[str, Any] | 
         rows = conn.execute(
             "SELECT f.id, f.survey, f.label, f.clock, f.chainage_from, f.chainage_to, f.arc_from, f.arc_to, f.kind,"
             " f.kind_label, f.kind_detected, f.origin, f.state, f.review, f.severity, f.width_mm, f.remark, f.area, f.length,"
-            " f.darkening_mean, f.darkening_max, f.contrast, f.confidence, f.reviewed_by,"
+            " f.darkening_mean, f.darkening_max, f.contrast, f.confidence, f.other_images, f.reviewed_by,"
             " to_char(f.reviewed_at, 'YYYY-MM-DD HH24:MI') AS reviewed_at,"
             " f.drawn_by, public.ST_AsGeoJSON(f.unrolled, 4)::json AS outline FROM tunnel_api.finding f WHERE f.id = %s",
             [finding_id],

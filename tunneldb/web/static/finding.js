@@ -33,6 +33,7 @@ function valuesOf(finding, severities) {
     ['Arc', `${arc(finding.arc_from)} to ${arc(finding.arc_to)}`],
     ['Darkening', finding.darkening_mean !== null ? `${number(finding.darkening_mean, 1)}\u00a0dB mean, ${number(finding.darkening_max, 1)}\u00a0dB maximum` : null],
     ['Contrast', finding.contrast !== null ? number(finding.contrast, 1) : null],
+    ['Other images', finding.other_images ?? null],
     ['Lining in the image', finding.image_share !== null && finding.image_share !== undefined ? percent(finding.image_share) : null],
     ['Reviewed', finding.reviewed_by ? `${finding.reviewed_by}, ${time(finding.reviewed_at)}` : 'not reviewed'],
   ].filter(([, value]) => value !== null && value !== undefined);

@@ -17,6 +17,7 @@ const PAUSE = 5000;
 const ORDERS = {
   likely: (a, b) => b.probability - a.probability, unlikely: (a, b) => a.probability - b.probability,
   doubtful: (a, b) => Math.abs(a.probability - 0.5) - Math.abs(b.probability - 0.5), large: (a, b) => b.area - a.area, chainage: () => 0,
+  images: (a, b) => (b.other_contrast ?? -1) - (a.other_contrast ?? -1),
 };
 
 let awayUntil = 0;
