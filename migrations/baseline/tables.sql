@@ -1242,7 +1242,7 @@ CREATE TABLE tunnel.imported_image (
     CONSTRAINT imported_image_pkey PRIMARY KEY (id),
     CONSTRAINT imported_image_survey_id_name_key UNIQUE (survey_id, name),
     CONSTRAINT imported_image_kind_check CHECK (kind IN ('thermal', 'photo', 'radar', 'moisture', 'other')),
-    CONSTRAINT imported_image_placement_check CHECK (placement IN ('coordinates', 'points', 'frames')),
+    CONSTRAINT imported_image_placement_check CHECK (placement IN ('coordinates', 'points', 'frames', 'poses')),
     CONSTRAINT imported_image_name_check CHECK (name ~ '^[a-z0-9][a-z0-9-]{0,39}$'),
     CONSTRAINT imported_image_unit_at_most_20_characters_check CHECK (char_length(unit) <= 20),
     CONSTRAINT imported_image_source_at_most_1000_characters_check CHECK (char_length(source) <= 1000),
@@ -1259,7 +1259,7 @@ COMMENT ON COLUMN tunnel.imported_image.value_from IS 'Least value of the source
 COMMENT ON COLUMN tunnel.imported_image.value_to IS 'Greatest value of the source, in the unit';
 COMMENT ON COLUMN tunnel.imported_image.step IS 'Size of one stored step, in the unit';
 COMMENT ON COLUMN tunnel.imported_image.pixel IS 'Side of a pixel, m';
-COMMENT ON COLUMN tunnel.imported_image.placement IS 'How it was placed: coordinates (of the file), points (control points), or frames (a table of places)';
+COMMENT ON COLUMN tunnel.imported_image.placement IS 'How it was placed: coordinates (of the file), points (control points), frames (a table of places), or poses (of the cameras of an E57 file)';
 COMMENT ON COLUMN tunnel.imported_image.model IS 'Mapping fitted to control points: similarity, affine or piecewise (along the tunnel); NULL without points';
 COMMENT ON COLUMN tunnel.imported_image.frames IS 'Number of source images';
 COMMENT ON COLUMN tunnel.imported_image.points IS 'Number of control points';

@@ -83,6 +83,7 @@ def write(settings: Settings, survey: str, output: Path, km: str | None) -> None
         "tunneldb image import ringo-2024 thermal.tif --kind thermal",
         "tunneldb image import ringo-2024 strip.tif --kind thermal --points points.csv --name thermal-night",
         "tunneldb image import ringo-2024 frames.csv --kind photo",
+        "tunneldb image import ringo-2024 scan.e57 --kind photo --pixel 0.01",
     ],
 )
 @click.argument("survey")
@@ -125,6 +126,8 @@ def import_(
     upper left corner), chainage and arc. An affine mapping is fitted to three points or more; with many points it
     follows a drifting odometer. Outliers are named and not used. (3) FILE is a CSV of frames with file, chainage_from
     (of the left edge), chainage_to, arc_from and arc_to (of the upper edge).
+
+    FILE may also be an E57: its pictures with a pose (pinhole, spherical, cylindrical) are projected onto the lining.
 
     A chainage may be a station, as 12+345.678. The image is resampled into blocks of the survey. An image of the
     same name is replaced. Refused are mirrored images, images outside the survey, and images whose seam is at

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,9 @@ from tunneldb.errors import InputError
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.image_files import Controls, ImageFile, open_image, own_controls, read_controls, read_frames
 from tunneldb.pipeline.other_images import measure_under_findings
+from tunneldb.pipeline.pictures import find_pictures, project_kilometre
+from tunneldb.pointcloud.formats.e57 import is_e57
+from tunneldb.raster.geotiff import Raster
 from tunneldb.raster.grid import BLOCK, Grid
 from tunneldb.raster.overview import Overview
 from tunneldb.raster.placement.checks import Lining, Placed, check_extent, check_fit, check_placement, scale_error
@@ -39,6 +43,8 @@ MAX_BLOCK = 10**8
 
 MAX_STEPS = 32000
 """Number of steps from 0 to the greatest value that are stored."""
+
+_Progress = Callable[[str, float | None], Callable[[float], None]]
 
 
 @dataclass(frozen=True)
@@ -109,6 +115,27 @@ class ImportedResult:
     notes: list[str]
 
 
+@dataclass(frozen=True)
+class _Prepared:
+    """Image that is to be stored.
+
+    Attributes
+    ----------
+    image : ImportedImage
+    placed : Placed
+    blocks : callable
+        Given a kilometre and its pixels; returns the blocks with values.
+    points, notes
+        As of `ImportedResult`.
+    """
+
+    image: ImportedImage
+    placed: Placed
+    blocks: Callable[[int, Grid], Iterator[tuple[int, Raster]]]
+    points: list[ControlPoint]
+    notes: list[str]
+
+
 @dataclass
 class _Placement:
     """Frames of an image with their extent, and the control points, if there are any."""
@@ -126,9 +153,9 @@ def import_image(
     survey: Survey,
     path: Path,
     settings: ImportSettings,
-    progress: Callable[[str, float | None], Callable[[float], None]],
+    progress: _Progress,
 ) -> ImportedResult:
-    """Import an image, or a table of images, in one transaction; replaces the image of that name.
+    """Import an image, a table of images, or the pictures of an E57 file, in one transaction; replaces the image of that name.
 
     Raises
     ------
@@ -136,6 +163,30 @@ def import_image(
         If a file cannot be read, or the image cannot be placed in the survey.
     """
     lining = Lining(*section_extent(conn, survey))
+    prepare = _prepare_pictures if is_e57(path) else _prepare_frames
+    done = prepare(conn, survey, path, settings, lining, progress)
+    image = done.image
+    replaced = replace_imported(conn, survey, image)
+    blocks = 0
+    found = []
+    kilometres = range(*_kilometres(done.placed, lining))
+    advance = progress("image", len(kilometres))
+    for km in kilometres:
+        stored = _store(conn, survey, km, done, lining)
+        found += [km] if stored else []
+        blocks += stored
+        advance(1)
+    if not blocks:
+        raise InputError(f"{path}: the image has no values within the lining of survey {survey.name}")
+    measure_under_findings(conn, survey, -np.inf, np.inf, image.image_kind)
+    conn.commit()
+    return ImportedResult(image, replaced, found, blocks, done.points, done.notes)
+
+
+def _prepare_frames(
+    conn: psycopg.Connection[Any], survey: Survey, path: Path, settings: ImportSettings, lining: Lining, progress: _Progress
+) -> _Prepared:
+    """Place images that show the unrolled lining, and describe the one that is to be stored."""
     done = _place(conn, survey, path, settings, lining)
     sources = [frame.source for frame in done.frames]
     low, high = _value_range(path, sources, progress)
@@ -167,33 +218,57 @@ def import_image(
         source=path.name,
         warnings=[*done.placed.warnings, *_of_values(settings, first.bands, low, high)],
     )
-    replaced = replace_imported(conn, survey, image)
-    blocks = 0
-    found = []
-    kilometres = range(*_kilometres(done.placed, lining))
-    advance = progress("image", len(kilometres))
-    for km in kilometres:
-        stored = _store(conn, survey, km, image, done.frames, lining)
-        found += [km] if stored else []
-        blocks += stored
-        advance(1)
-    if not blocks:
-        raise InputError(f"{path}: the image has no values within the lining of survey {survey.name}")
-    measure_under_findings(conn, survey, -np.inf, np.inf, image.image_kind)
-    conn.commit()
-    return ImportedResult(image, replaced, found, blocks, done.points, done.notes)
+    return _Prepared(image, done.placed, lambda km, grid: resample(done.frames, grid), done.points, done.notes)
 
 
-def _store(
-    conn: psycopg.Connection[Any], survey: Survey, km: int, image: ImportedImage, frames: Sequence[Frame], lining: Lining
-) -> int:
+def _prepare_pictures(
+    conn: psycopg.Connection[Any], survey: Survey, path: Path, settings: ImportSettings, lining: Lining, progress: _Progress
+) -> _Prepared:
+    """Find the pictures of an E57 file in the tunnel, and describe the image that is to be stored."""
+    if settings.kind != "photo":
+        raise InputError(f"{path}: pictures of an E57 file are colours, not values of kind {settings.kind}: give --kind photo")
+    for option in ("points", "unit", "band", "scale", "offset"):
+        if getattr(settings, option) is not None:
+            raise InputError(
+                f"{path}: pictures of an E57 file are placed by their poses and have no values: leave out --{option}"
+            )
+    found = find_pictures(conn, survey, path, lining)
+    pixel = _checked_pixel(settings.pixel or found.pixel, settings.pixel is not None, found.placed, lining)
+    image = ImportedImage(
+        name=settings.name,
+        kind=settings.kind,
+        colour=True,
+        unit="",
+        value_from=0.0,
+        value_to=255.0,
+        step=stored_step(255.0),
+        pixel=pixel,
+        placement="poses",
+        model=None,
+        frames=len(found.pictures),
+        points=None,
+        outliers=None,
+        residual=None,
+        predicted=None,
+        chainage_from=found.placed.chainage_from,
+        chainage_to=found.placed.chainage_to,
+        arc_from=found.placed.arc_from,
+        arc_to=found.placed.arc_to,
+        source=path.name,
+        warnings=found.placed.warnings,
+    )
+    return _Prepared(image, found.placed, partial(project_kilometre, conn, survey, found), [], [])
+
+
+def _store(conn: psycopg.Connection[Any], survey: Survey, km: int, done: _Prepared, lining: Lining) -> int:
     """Write the blocks of a kilometre, and its overview; return their number."""
+    image = done.image
     arcs = max(image.arc_from, lining.arc_from), min(image.arc_to, lining.arc_to)
     ends = max(image.chainage_from, lining.chainage_from), min(image.chainage_to, lining.chainage_to)
     grid = Grid.covering(km, image.pixel, *arcs, chainages=ends)
     overview = Overview(image.image_kind)
     count = 0
-    for block, raster in resample(frames, grid):
+    for block, raster in done.blocks(km, grid):
         insert_pixels(conn, survey, km, image, overview, block, raster)
         count += 1
     insert_overview(conn, survey, km, image, overview)
@@ -223,9 +298,7 @@ def _of_values(settings: ImportSettings, bands: int, low: float, high: float) ->
     return []
 
 
-def _value_range(
-    path: Path, sources: Sequence[Any], progress: Callable[[str, float | None], Callable[[float], None]]
-) -> tuple[float, float]:
+def _value_range(path: Path, sources: Sequence[Any], progress: _Progress) -> tuple[float, float]:
     advance = progress("values", len(sources))
     low, high = np.inf, -np.inf
     for source in sources:

@@ -10,7 +10,7 @@ from sqlalchemy.orm import Mapped, mapped_column
 from tunneldb.database.models.base import NOW, SURVEY, Base, at_most, one_of, parent
 
 KINDS = ("thermal", "photo", "radar", "moisture", "other")
-PLACEMENTS = ("coordinates", "points", "frames")
+PLACEMENTS = ("coordinates", "points", "frames", "poses")
 
 
 class ImportedImage(Base):
@@ -41,7 +41,8 @@ class ImportedImage(Base):
     step: Mapped[float] = mapped_column(comment="Size of one stored step, in the unit")
     pixel: Mapped[float] = mapped_column(comment="Side of a pixel, m")
     placement: Mapped[str] = mapped_column(
-        comment="How it was placed: coordinates (of the file), points (control points), or frames (a table of places)"
+        comment="How it was placed: coordinates (of the file), points (control points), frames (a table of places), or poses"
+        " (of the cameras of an E57 file)"
     )
     model: Mapped[str | None] = mapped_column(
         comment="Mapping fitted to control points: similarity, affine or piecewise (along the tunnel); NULL without points"

@@ -385,12 +385,13 @@ def _scan(index: int, node: Any) -> Scan:
     fields = frozenset(prototype.get(i).elementName() for i in range(prototype.childCount()))
     name = scan_name(node, index)
     guid = node["guid"].value() if node.isDefined("guid") else f"{name} {index}"
-    rotation, position = _pose(node)
+    rotation, position = pose_of(node)
     start = value_of(node, "acquisitionStart/dateTimeValue")
     return Scan(index, name, scan_number(guid, position), points.childCount(), fields, rotation, position, start)
 
 
-def _pose(node: Any) -> tuple[Float, Float | None]:
+def pose_of(node: Any) -> tuple[Float, Float | None]:
+    """Return the rotation of a scan or a picture into the file's frame, and its position, m; None without a pose."""
     if not node.isDefined("pose"):
         return np.eye(3), None
     position = np.array([value_of(node, f"pose/translation/{name}", 0.0) for name in "xyz"], np.float64)
