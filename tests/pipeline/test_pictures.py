@@ -11,6 +11,7 @@ import pytest
 from click.testing import CliRunner, Result
 from scipy.spatial.transform import Rotation
 from support.e57_pictures import Shot, write_e57
+from support.example_objects import relief
 from support.example_survey import NAME
 
 from tunneldb.cli.main import main
@@ -48,7 +49,8 @@ def panorama(surface, place: np.ndarray, turn: Rotation, columns: int = 3600) ->
     """A spherical picture of the spots, each drawn where its direction from the camera leads, 4 cm wide; the rest is grey."""
     rows = columns // 2
     step = 2 * np.pi / columns
-    spots = surface.to_space(*np.array(SPOTS).T, np.zeros(len(SPOTS)))
+    chainage, arc = np.array(SPOTS).T
+    spots = surface.to_space(chainage, arc, relief(chainage, arc))  # as the example's image of the offset has it
     azimuth = (columns / 2 - np.arange(columns) - 0.5) * step
     elevation = (rows / 2 - np.arange(rows) - 0.5) * step
     pixels = np.full((rows, columns, 3), 90, np.uint8)

@@ -107,6 +107,8 @@ def _rows(look: FileLook) -> list[tuple[str, str]]:
     ]
     if look.colours is not None:
         rows.append(("colours", look.colours))
+    if look.pictures:
+        rows.append(("pictures", "; ".join(look.pictures)))
     return rows
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from pyproj import CRS
 
 from tunneldb.arrays import Bool, Float
+from tunneldb.counted import counted
 from tunneldb.errors import UserError
 from tunneldb.geometry.crs import describe_crs, describe_heights, in_metres
 from tunneldb.geometry.crs_equality import epsg_code, horizontal
@@ -20,6 +21,8 @@ from tunneldb.pipeline.inspected_poses import doubt_poses, file_beside
 from tunneldb.pointcloud.colour_depth import colour_depth
 from tunneldb.pointcloud.contents import Contents, read_contents, read_near, read_values
 from tunneldb.pointcloud.form import WINDOW, TunnelForm, profile_spacing, surface_density, tunnel_form
+from tunneldb.pointcloud.formats.e57 import is_e57
+from tunneldb.pointcloud.formats.e57_pictures import read_pictures
 from tunneldb.pointcloud.formats.las import read_las_facts
 from tunneldb.pointcloud.formats.pose_contradictions import lost_positions, position_notes
 from tunneldb.pointcloud.formats.scans import PosedScan
@@ -145,6 +148,8 @@ class FileLook:
         Why the axis beside the file does not fit the points.
     colours : str or None
         Bits of the colours of its points; None if they have none.
+    pictures : list of str
+        Pictures in it: projection, size, and whether they have a pose.
     header_note : str or None
         Difference between its header and its points.
     only_noise : bool
@@ -187,6 +192,7 @@ class FileLook:
     pose_doubt: str | None = None
     axis_doubt: str | None = None
     colours: str | None = None
+    pictures: list[str] = field(default_factory=list)
 
     @property
     def other_than_a_tunnel(self) -> str | None:
@@ -265,7 +271,26 @@ def inspect_file(path: Path, begin: StartProgress, given: GivenUnits = NOT_GIVEN
         pose_doubt,
         None if axis is None else doubt_axis(axis, contents.xyz),
         None if depth is None else str(depth),
+        _pictures(path),
     )
+
+
+def _pictures(path: Path) -> list[str]:
+    """Return the kinds of pictures in an E57 file, with their number and those without a pose."""
+    if not is_e57(path):
+        return []
+    try:
+        every = read_pictures(path)
+    except UserError as error:
+        return [str(error).removeprefix(f"{path}: ")]
+    found = []
+    for projection, columns, rows in dict.fromkeys((one.projection, one.columns, one.rows) for one in every):
+        same = [one for one in every if (one.projection, one.columns, one.rows) == (projection, columns, rows)]
+        lost = sum(not one.placed for one in same)
+        what = "without a projection" if projection == "none" else projection
+        place = "" if projection == "none" else " with poses" if not lost else f", {lost} without a pose"
+        found.append(f"{counted(len(same), 'picture')} {what}{place}, {columns} × {rows} pixels")
+    return found
 
 
 def _converted(scan: PosedScan, units: Units) -> PosedScan:
