@@ -13,7 +13,7 @@ from tunneldb.arrays import Single
 from tunneldb.export.images.palette import ramp_colours
 from tunneldb.export.images.tile_png import Stretch, imported_stretch, paint
 from tunneldb.geometry.stationing import KILOMETRE
-from tunneldb.raster.geotiff import OVERVIEW, Raster, imported_label
+from tunneldb.raster.geotiff import OVERVIEW, Raster
 from tunneldb.raster.grid import BLOCK, BLOCKS
 from tunneldb.raster.tiles import reduce
 from tunneldb.report import text
@@ -63,15 +63,12 @@ class ShownImage:
 
     Attributes
     ----------
-    title : str
-        Kind and name.
     stretch : Stretch
         Values with the first and the last colour.
     """
 
     def __init__(self, facts: Facts, row: StoredImage) -> None:
         self._facts, self.row = facts, row
-        self.title = imported_label(row.name, row.kind)
         self.stretch = self._stretch()
 
     @property
