@@ -10,6 +10,7 @@ from qgis.core import (
     QgsContrastEnhancement,
     QgsMapRendererParallelJob,
     QgsMapSettings,
+    QgsMultiBandColorRenderer,
     QgsProject,
     QgsRasterLayer,
     QgsRasterShader,
@@ -149,8 +150,13 @@ def _is_image(layer: object) -> bool:
 
 
 def _style(layer: QgsRasterLayer, kind: str) -> None:
-    """Draw an image as projects of tunneldb do: intensity in grey, offset blue outside and red inside."""
+    """Draw an image as projects of tunneldb do: intensity in grey, offset blue outside and red inside, colour as it is."""
     provider = layer.dataProvider()
+    if kind == "rgb":
+        colours = QgsMultiBandColorRenderer(provider, 1, 2, 3)
+        colours.setAlphaBand(4)
+        layer.setRenderer(colours)
+        return
     if kind == "offset":
         ramp = QgsColorRampShader(-_OFFSET, _OFFSET)
         ramp.setColorRampType(QgsColorRampShader.Interpolated)

@@ -15,7 +15,7 @@ from .cutouts import CutoutMaker, ImageSource, Picture
 from .database import DatabaseError
 from .facts_panel import FactsPanel, keys_of
 from .filter_bar import FilterBar
-from .images import KINDS, window
+from .images import KINDS, OPTIONAL, window
 from .own_keys import OwnKeys
 from .session import Session
 from .worklist import CONFIRMED, OPEN, REJECTED, Finding
@@ -282,6 +282,7 @@ class ReviewDock(QDockWidget):
             picture = self._picture(current, kind, view)
             layers = self.source.layers(session.survey, kind, picture.window[0], picture.window[1])
             view.show_finding(picture, session.facts["outline"] or "", session.facts["review"], "" if layers else NO_IMAGE)
+            view.setVisible(bool(layers) or kind not in OPTIONAL)
             image = self.maker.get(picture)
             if image is not None:
                 view.set_image(image)
@@ -296,7 +297,9 @@ class ReviewDock(QDockWidget):
         for finding in session.work.ahead(AHEAD) if session is not None else ():
             for kind, view in self.views.items():
                 picture = self._picture(finding, kind, view)
-                self.maker.want(picture, self.source.layers(session.survey, kind, picture.window[0], picture.window[1]))
+                layers = self.source.layers(session.survey, kind, picture.window[0], picture.window[1])
+                if layers:
+                    self.maker.want(picture, layers)
 
     def _picture(self, finding: Finding, kind: str, view: CutoutView) -> Picture:
         ratio = view.devicePixelRatioF()
@@ -353,8 +356,9 @@ class ReviewDock(QDockWidget):
         column.addWidget(self.told)
         column.addWidget(self.progress)
         row.addWidget(left)
-        for view in self.views.values():
+        for kind, view in self.views.items():
             row.addWidget(view, 1)
+            view.setVisible(kind not in OPTIONAL)
         row.addWidget(right)
         beside = QVBoxLayout(right)
         beside.setContentsMargins(0, 0, 0, 0)

@@ -7,8 +7,11 @@ import re
 from dataclasses import dataclass
 from typing import Dict, Iterable, List, Optional, Tuple
 
-KINDS = {"raw": "Intensity, raw", "corrected": "Intensity, corrected", "offset": "Offset"}
+KINDS = {"raw": "Intensity, raw", "corrected": "Intensity, corrected", "rgb": "Colour", "offset": "Offset"}
 """Kinds of image shown side by side, with their titles."""
+
+OPTIONAL = ("rgb",)
+"""Kinds that are hidden if a survey has no such image."""
 
 _NAME = re.compile(r"^(?P<survey>.+)-km(?P<km>-?\d+)-(?P<kind>[a-z]+)(?P<filled>-filled)?\.tif$", re.IGNORECASE)
 _MARGIN, _LEAST = 0.6, 1.6

@@ -163,7 +163,7 @@ def test_an_inspector_reviews_by_keys(
     assert seen["loaded"]["version"] == tunneldb.__version__
     assert {"tunneldb:run", "tunneldb:batch", "tunneldb:evaluate", "tunneldb:report"} <= set(seen["loaded"]["algorithms"])
     did = seen["review"]
-    assert did["pictures"] == {"raw": True, "corrected": True, "offset": True}
+    assert did["pictures"] == {"raw": True, "corrected": True, "rgb": False, "offset": True}
     assert did["followed"]
     assert did["first"] == did["previous"] != did["next"] == did["after_confirm"] == did["rejected"]
     assert did["focus_back"]

@@ -42,6 +42,7 @@ def test_a_thermal_image_is_shown_in_its_place(signed_in: SignIn, conn: psycopg.
     browser = signed_in("viola_web")
     kinds = {kind["kind"]: kind for kind in browser.get(f"/api/surveys/{NAME}").json()["kinds"]}
     assert (kinds["imported_night"]["label"], kinds["imported_night"]["unit"]) == ("Imported: thermal, night", "°C")
+    assert (kinds["imported_night"]["ramp"][0], kinds["imported_night"]["ramp"][-1]) == ("#000004", "#fcffa4")
     ends = browser.get(f"/api/surveys/{NAME}/colours/imported_night").json()
     assert ends["low"] == pytest.approx(10.0, abs=0.1)
     for zoom in (20, 22):

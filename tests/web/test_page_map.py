@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import psycopg
 import pytest
+from click.testing import CliRunner
 from PIL import Image
 from playwright.sync_api import Browser, BrowserContext, Page, Route, expect
 from support.desk_page import DESKTOP, PATIENCE, at, comes_to, forgive, opened, position, settled, sign_in
 from support.desk_server import DeskServer
 from support.example_survey import LEAKS, NAME
+from support.imported_image import STATED, strip, write
 from web.conftest import PASSWORD
 
+from tunneldb.cli.main import main
 from tunneldb.numerals import percent_number
 
 ORANGE = (230, 126, 0)
@@ -139,6 +144,19 @@ def test_lining_pans_and_zooms_and_shows_outlines(page: Page) -> None:
     with page.expect_response(lambda answer: f"/tiles/{NAME}/offset/" in answer.url and answer.status == 200):
         page.get_by_label("Image").select_option("offset")
     expect(page.locator(".legend")).to_contain_text("m")
+
+
+def test_the_legend_has_range_and_unit_of_an_imported_image(
+    ines_context: BrowserContext, database: psycopg.Connection, survey_dsn: str, tmp_path: Path
+) -> None:
+    image = write(tmp_path / "a.tif", strip(STATED), STATED, "°C")
+    words = ["--dsn", survey_dsn, "image", "import", NAME, str(image), "--kind", "thermal"]
+    assert CliRunner().invoke(main, words).exit_code == 0
+    with opened(ines_context, f"/#/{NAME}") as page:
+        page.get_by_label("Image").select_option("imported_thermal")
+        expect(page.locator(".legend")).to_have_text(re.compile(r"^10\.001\d\.\d\d\s°C$"))
+        page.get_by_label("Image").select_option("offset")
+        expect(page.locator(".legend")).to_contain_text("m")
 
 
 def test_two_surveys_by_a_swipe_and_one_above_the_other(page: Page) -> None:

@@ -114,7 +114,7 @@ def test_tiles_in_colour(signed_in: SignIn, conn: psycopg.Connection, zoom: int)
     add_image_in_colour(conn, "demo-2024")
     browser = signed_in("viola_web")
     kinds = browser.get("/api/surveys/demo-2024").json()["kinds"]
-    assert {"kind": "rgb", "label": "Colour", "unit": "", "signed": False} in kinds
+    assert {"kind": "rgb", "label": "Colour", "unit": "", "signed": False, "ramp": []} in kinds
     assert browser.get("/api/surveys/demo-2024/colours/rgb").json() == {"low": 0, "high": 255}
     for place, colour in ((2.0, ABOVE), (-2.0, BELOW)):
         tile = tile_at(zoom, 12350.0, place)

@@ -10,10 +10,10 @@ import numpy as np
 from PIL import Image
 
 from tunneldb.arrays import Single
-from tunneldb.export.images.palette import RAMPS, hexadecimal
+from tunneldb.export.images.palette import ramp_colours
 from tunneldb.export.images.tile_png import Stretch, imported_stretch, paint
 from tunneldb.geometry.stationing import KILOMETRE
-from tunneldb.raster.geotiff import OVERVIEW, Raster, imported_label
+from tunneldb.raster.geotiff import OVERVIEW, Raster
 from tunneldb.raster.grid import BLOCK, BLOCKS
 from tunneldb.raster.tiles import reduce
 from tunneldb.report import text
@@ -63,21 +63,18 @@ class ShownImage:
 
     Attributes
     ----------
-    title : str
-        Kind and name.
     stretch : Stretch
         Values with the first and the last colour.
     """
 
     def __init__(self, facts: Facts, row: StoredImage) -> None:
         self._facts, self.row = facts, row
-        self.title = imported_label(row.name, row.kind)
         self.stretch = self._stretch()
 
     @property
     def colours(self) -> str:
         """Colours from the least to the greatest value, for CSS."""
-        return ", ".join(hexadecimal(colour) for colour in RAMPS.get(self.row.kind, ((0, 0, 0), (255, 255, 255))))
+        return ", ".join(ramp_colours(self.row.kind))
 
     def strips(self) -> Iterator[ImageStrip]:
         """Draw the strips of the report's stretch that have values of the image."""

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from tunneldb.errors import UserError
+from tunneldb.export.images.palette import BLUE, PALETTES, RED, WHITE, hexadecimal, ramp_colours
 from tunneldb.export.images.tile_png import is_signed
 from tunneldb.finding_kind import FindingKind
 from tunneldb.store.desk import surveys
-from tunneldb.store.desk.images import KINDS, find_image, images
+from tunneldb.store.desk.images import KINDS, ImageKind, find_image, images
 from tunneldb.store.desk.surveys import Place
 from tunneldb.web.route import Call, NotFoundError
 from tunneldb.web.sessions import Connection
@@ -75,15 +76,25 @@ def one(call: Call) -> Any:
         low, high = measured(survey)
         ends = surveys.arcs(conn, survey.id) or (0.0, 0.0)
         kinds = [
-            {"kind": image.kind, "label": image.label, "unit": image.unit, "signed": is_signed(image.kind)}
+            {
+                "kind": image.kind, "label": image.label, "unit": image.unit, "signed": is_signed(image.kind),
+                "ramp": _ramp(image),
+            }
             for image in images(conn, survey.id)
-        ]
+        ]  # fmt: skip
         return {
             "id": survey.id, "name": survey.name, "tunnel": survey.tunnel, "date": survey.date, "from": low, "to": high,
             "arc_from": ends[0], "arc_to": ends[1], "kinds": kinds,
             "finding_kinds": [{**k, "colour": KIND_COLOURS.get(k["code"], OTHER_COLOUR)} for k in surveys.finding_kinds(conn)],
             "severities": surveys.severities(conn), "neighbours": surveys.neighbours(conn, survey),
         }  # fmt: skip
+
+
+def _ramp(image: ImageKind) -> list[str]:
+    """Return the colours of an image from its least to its greatest value; none of one with colours or codes."""
+    if image.colour or image.palette in PALETTES:
+        return []
+    return [hexadecimal(colour) for colour in (BLUE, WHITE, RED)] if is_signed(image.kind) else ramp_colours(image.palette)
 
 
 def summary(call: Call) -> Any:

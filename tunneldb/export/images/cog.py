@@ -61,7 +61,7 @@ def write_cog(
     blocks : iterable of (int, (rows, columns) array)
         First column and pixels of each block; (rows, columns, 4) for colours.
     name : str
-        Name of the band, if not its kind.
+        Name of the band, if not its kind; added to those of colours.
     colour : bool
         True if the blocks are colours.
     unit : str, optional
@@ -82,7 +82,7 @@ def write_cog(
     ) as image:  # fmt: skip
         if colour:
             for band, what in enumerate((*COLOURS, "opacity"), start=1):
-                image.set_band_description(band, what)
+                image.set_band_description(band, f"{what}, {name}" if name else what)
         else:
             image.set_band_description(1, name or kind)
         if palette:

@@ -68,13 +68,13 @@ def export_kilometre(conn: psycopg.Connection, survey: Survey, km: int, folder: 
 def export_filled(conn: psycopg.Connection, survey: Survey, km: int, folder: Path) -> list[Path]:
     """Write the images of a kilometre with filled gaps, ``SURVEY-kmNNN-KIND-filled.tif``, and return their paths.
 
-    The kinds are corrected intensity, or the offset without intensity, and deviation. Their pixels are those of a preview: they
-    are only for display, below the measured image. Name and metadata of the band state this. A profile beyond the end of the
-    kilometre fills too. The connection must be idle.
+    The kinds are corrected intensity, or the offset without intensity, colour, and deviation. Their pixels are those of a
+    preview: they are only for display, below the measured image. Name and metadata of the band state this. A profile beyond the
+    end of the kilometre fills too. The connection must be idle.
     """
     with snapshot(conn):
         seen = "corrected" if image_blocks(conn, survey, km, "corrected") else "offset"
-        written = [_export_filled(conn, survey, km, kind, folder) for kind in (seen, *DEVIATION_KINDS.values())]
+        written = [_export_filled(conn, survey, km, kind, folder) for kind in (seen, RGB, *DEVIATION_KINDS.values())]
     return [path for path in written if path is not None]
 
 
@@ -85,7 +85,7 @@ def _export_filled(conn: psycopg.Connection, survey: Survey, km: int, kind: str,
         return None
     first = load_block(conn, survey, km, kind, blocks[0])
     factor = preview_factor(first.transform.a)
-    rows, columns = (-(-n // factor) for n in first.values.shape)
+    rows, columns = (-(-n // factor) for n in first.values.shape[:2])
     extent = Extent(first.transform @ Affine.scale(factor), rows, columns * (blocks[-1] - blocks[0] + 1))
     around = [
         *_beside(conn, survey, kind, blocks[0] - 1),
@@ -102,8 +102,10 @@ def _export_filled(conn: psycopg.Connection, survey: Survey, km: int, kind: str,
 
     path = folder / f"{survey.name}-km{km:03d}-{kind}-filled.tif"
     filled = fill_blocks(shrunk(), MAX_FILL_DISTANCE / extent.transform.a)
+    colour = kind == RGB
+    blocks_of = ((at, opaque(values) if colour else values) for at, values in filled if 0 <= at < extent.columns)
     with replacing(path) as temporary:
-        write_cog(temporary, kind, extent, (b for b in filled if 0 <= b[0] < extent.columns), f"{kind}, {FILL_NOTE}")
+        write_cog(temporary, kind, extent, blocks_of, f"{kind}, {FILL_NOTE}", colour=colour)
     return path
 
 

@@ -65,6 +65,11 @@ PALETTES = {
 """Palettes of the kinds of image with codes: classes of points, states of pixels."""
 
 
+def ramp_colours(kind: str) -> list[str]:
+    """Return the colours of values without signs, from the least to the greatest, as ``#rrggbb``: grey if not in RAMPS."""
+    return [hexadecimal(colour) for colour in RAMPS.get(kind, ((0, 0, 0), (255, 255, 255)))]
+
+
 def hexadecimal(colour: Colour) -> str:
     """Return a colour as ``#rrggbb``."""
     return "#{:02x}{:02x}{:02x}".format(*colour)

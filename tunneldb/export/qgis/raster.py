@@ -27,6 +27,7 @@ KINDS = {
     "corrected": "Intensity, corrected",
     f"corrected{FILLED}": f"Intensity, corrected, {FILL_NOTE}",
     RGB: "Colour",
+    f"{RGB}{FILLED}": f"Colour, {FILL_NOTE}",
     "raw": "Intensity, raw",
     "offset": "Offset",
     f"offset{FILLED}": f"Offset, {FILL_NOTE}",
@@ -106,7 +107,7 @@ def pipe(kind: str, paths: Sequence[Path]) -> ET.Element:
     darker the deeper. An image in colour has its own colours.
     """
     element = ET.Element("pipe")
-    if kind == RGB:
+    if kind.removesuffix(FILLED) == RGB:
         renderer = _colours(element)
     elif kind in PALETTES:
         renderer = ET.SubElement(element, "rasterrenderer", type="paletted", band="1")

@@ -6,7 +6,7 @@ A pixel coordinate counts from the left and from the upper edge of the image: th
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from affine import Affine
@@ -15,7 +15,7 @@ from tunneldb.arrays import Float
 
 
 class Mapping(Protocol):
-    """Mapping from pixels (column, row) to places (chainage, arc), m, and back."""
+    """Mapping from pixels (column, row) to places (chainage, arc), m."""
 
     @property
     def linear(self) -> Affine:
@@ -24,8 +24,20 @@ class Mapping(Protocol):
     def forward(self, column: Float, row: Float) -> tuple[Float, Float]:
         """Return chainage and arc of pixels, m."""
 
-    def inverse(self, chainage: Float, arc: Float) -> tuple[Float, Float]:
-        """Return column and row of places."""
+    def uncorrected(self, chainage: Float) -> tuple[Float, Float]:
+        """Return chainages without the local correction, and the local correction of the arc there, m."""
+
+    def bounds(self, columns: int, rows: int) -> Bounds:
+        """Return a rectangle of the unrolled plane around an image."""
+
+
+class Bounds(NamedTuple):
+    """Rectangle in the unrolled plane, m."""
+
+    chainage_from: float
+    chainage_to: float
+    arc_from: float
+    arc_to: float
 
 
 @dataclass(frozen=True)
@@ -44,9 +56,14 @@ class AffineMapping:
         """Return chainage and arc of pixels, m."""
         return apply(self.linear, column, row)
 
-    def inverse(self, chainage: Float, arc: Float) -> tuple[Float, Float]:
-        """Return column and row of places."""
-        return apply(~self.linear, chainage, arc)
+    def uncorrected(self, chainage: Float) -> tuple[Float, Float]:
+        """Return chainages without the local correction, and the local correction of the arc there, m."""
+        return chainage, np.zeros_like(chainage)
+
+    def bounds(self, columns: int, rows: int) -> Bounds:
+        """Return a rectangle of the unrolled plane around an image."""
+        chainage, arc = apply(self.linear, np.array([0.0, columns, 0.0, columns]), np.array([0.0, 0.0, rows, rows]))
+        return Bounds(float(chainage.min()), float(chainage.max()), float(arc.min()), float(arc.max()))
 
 
 @dataclass(frozen=True)
@@ -76,16 +93,29 @@ class PiecewiseMapping:
             around + np.interp(along, self.knots, self.arc_shift),
         )
 
-    def inverse(self, chainage: Float, arc: Float) -> tuple[Float, Float]:
-        """Return column and row of places."""
+    def uncorrected(self, chainage: Float) -> tuple[Float, Float]:
+        """Return chainages without the local correction, and the local correction of the arc there, m."""
         # The shift is linear between the corrected knots as well, as a function of the corrected chainage.
         along = chainage - np.interp(chainage, self.knots + self.chainage_shift, self.chainage_shift)
-        return apply(~self.linear, along, arc - np.interp(along, self.knots, self.arc_shift))
+        return along, np.interp(along, self.knots, self.arc_shift)
+
+    def bounds(self, columns: int, rows: int) -> Bounds:
+        """Return a rectangle of the unrolled plane around an image."""
+        west, east, low, high = AffineMapping(self.linear).bounds(columns, rows)
+        ends = np.array([west, east])
+        west, east = (ends + np.interp(ends, self.knots, self.chainage_shift)).tolist()
+        return Bounds(west, east, low + float(self.arc_shift.min()), high + float(self.arc_shift.max()))
 
 
 def apply(transform: Affine, x: Float, y: Float) -> tuple[Float, Float]:
     """Return transformed coordinates."""
     return transform.a * x + transform.b * y + transform.c, transform.d * x + transform.e * y + transform.f
+
+
+def inverse(mapping: Mapping, chainage: Float, arc: Float) -> tuple[Float, Float]:
+    """Return column and row of places."""
+    along, shift = mapping.uncorrected(chainage)
+    return apply(~mapping.linear, along, arc - shift)
 
 
 def pixel_sides(mapping: Mapping) -> tuple[float, float]:

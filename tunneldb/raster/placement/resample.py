@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-from scipy import ndimage
 
-from tunneldb.arrays import Float, Single
+from tunneldb.arrays import Float, Int64, Single
+from tunneldb.compiled import kernel
 from tunneldb.raster.geotiff import Raster
 from tunneldb.raster.grid import BLOCK, Grid
-from tunneldb.raster.placement.mapping import Mapping, outline, pixel_sides
+from tunneldb.raster.placement.mapping import Bounds, Mapping, inverse, pixel_sides
 
 PIXELS = (0.002, 0.0025, 0.004, 0.005, 0.01, 0.02, 0.025, 0.04, 0.05, 0.1, 0.2, 0.25, 0.5, 1.0)
 """Sides of the pixels of imported images, m: they divide a block of 50 m."""
 
-PART = 1 << 20
+PART = 1 << 24
 """Number of pixels that are computed at once."""
 
 MAX_SOURCE = 1 << 26
@@ -59,11 +59,6 @@ class Frame:
     source: Source
     mapping: Mapping
 
-    def ends(self) -> tuple[float, float]:
-        """Return its least and greatest chainage, m."""
-        chainage, _ = outline(self.mapping, self.source.columns, self.source.rows)
-        return float(chainage.min()), float(chainage.max())
-
 
 def usual_pixel(mapping: Mapping) -> float:
     """Return the side of the pixels of an imported image, m: the next smaller of PIXELS, or the smallest."""
@@ -88,10 +83,14 @@ def resample(frames: Sequence[Frame], grid: Grid) -> Iterator[tuple[int, Raster]
     raster : Raster
         Its values; of three bands as colours.
     """
-    extents = [frame.ends() for frame in frames]
+    bounds = [frame.mapping.bounds(frame.source.columns, frame.source.rows) for frame in frames]
     for first in range(0, grid.columns, grid.block_columns):
         west = grid.west + first * grid.pixel
-        inside = [frame for frame, (low, high) in zip(frames, extents, strict=True) if low < west + BLOCK and high > west]
+        inside = [
+            (frame, place)
+            for frame, place in zip(frames, bounds, strict=True)
+            if place.chainage_from < west + BLOCK and place.chainage_to > west
+        ]
         if not inside:
             continue
         values = _block(inside, grid, first)
@@ -100,56 +99,127 @@ def resample(frames: Sequence[Frame], grid: Grid) -> Iterator[tuple[int, Raster]
             yield grid.first_block + first // grid.block_columns, Raster(pixels, grid.transform(first))
 
 
-def _block(frames: Sequence[Frame], grid: Grid, first: int) -> Single:
+def _block(frames: Sequence[tuple[Frame, Bounds]], grid: Grid, first: int) -> Single:
     """Return the values (bands, rows, columns) of a block that begins with a column."""
-    out = np.full((frames[0].source.bands, grid.rows, grid.block_columns), np.nan, np.float32)
+    shape = grid.rows, grid.block_columns
+    out = np.full((frames[0][0].source.bands, *shape), np.nan, np.float32)
+    nearest = np.full(shape, np.inf, np.float32)
+    chainages, arcs = grid.chainages(slice(first, first + grid.block_columns)), grid.arcs()
     width = max(1, PART // grid.rows)
-    arcs = grid.arcs()[:, None]
-    for start in range(0, grid.block_columns, width):
-        part = slice(start, min(start + width, grid.block_columns))
-        chainages = grid.chainages(slice(first + part.start, first + part.stop))[None, :]
-        nearest = np.full((grid.rows, part.stop - part.start), np.inf, np.float32)
-        for frame in frames:
-            _add(out[:, :, part], nearest, frame, chainages, arcs, grid.pixel)
+    for frame, place in frames:
+        rows = slice(*np.searchsorted(-arcs, (-place.arc_to, -place.arc_from)).tolist())
+        west, east = np.searchsorted(chainages, (place.chainage_from, place.chainage_to)).tolist()
+        for start in range(west, east, width):
+            _add(out, nearest, frame, _Part(slice(start, min(start + width, east)), rows, chainages, arcs, grid.pixel))
     return out
 
 
-def _add(out: Single, nearest: Single, frame: Frame, chainages: Float, arcs: Float, pixel: float) -> None:
-    """Add an image to values (bands, rows, columns), where its middle is nearer than that of images before."""
-    source = frame.source
-    column, row = (np.asarray(v) for v in np.broadcast_arrays(*frame.mapping.inverse(chainages, arcs)))
-    inside = (column >= 0) & (column <= source.columns) & (row >= 0) & (row <= source.rows)
-    middle = np.maximum(abs(column / source.columns - 0.5), abs(row / source.rows - 0.5)).astype(np.float32)
-    inside &= middle < nearest
-    if not inside.any():
+@dataclass(frozen=True)
+class _Part:
+    """Part of a block.
+
+    Attributes
+    ----------
+    columns, rows : slice
+    chainages, arcs : (n,) array
+        Of the columns and rows of the whole block, m.
+    pixel : float
+        Side of a pixel, m.
+    """
+
+    columns: slice
+    rows: slice
+    chainages: Float
+    arcs: Float
+    pixel: float
+
+    def halves(self) -> list[_Part]:
+        """Return its left and its right half."""
+        middle = (self.columns.start + self.columns.stop) // 2
+        return [
+            replace(self, columns=columns) for columns in (slice(self.columns.start, middle), slice(middle, self.columns.stop))
+        ]
+
+
+def _add(out: Single, nearest: Single, frame: Frame, part: _Part) -> None:
+    """Add an image to a part of a block (bands, rows, columns), where its middle is nearer than that of images before."""
+    chainages, arcs = part.chainages[part.columns], part.arcs[part.rows]
+    if not (len(chainages) and len(arcs)):
         return
-    factor = max(1, int(pixel / max(pixel_sides(frame.mapping)) + 0.05))
-    columns, rows = (_window(v[inside], count, factor) for v, count in ((column, source.columns), (row, source.rows)))
+    source, mapping = frame.source, frame.mapping
+    at = inverse(mapping, chainages, arcs[[0, -1], None])
+    factor = max(1, int(part.pixel / max(pixel_sides(mapping)) + 0.05))
+    columns, rows = (_window(v, count, factor) for v, count in zip(at, (source.columns, source.rows), strict=True))
     while (columns.stop - columns.start) * (rows.stop - rows.start) > MAX_SOURCE * factor**2:
+        if len(chainages) > 1:
+            for half in part.halves():
+                _add(out, nearest, frame, half)
+            return
         factor *= 2
-    values = source.read(columns, rows, factor)
-    at = np.stack([(row[inside] - rows.start) / factor - 0.5, (column[inside] - columns.start) / factor - 0.5])
-    found = np.stack([_interpolate(band, at) for band in values])
-    there = np.isfinite(found).all(axis=0)
-    place = np.flatnonzero(inside)[there]
-    at_row, at_column = np.unravel_index(place, inside.shape)
-    out[:, at_row, at_column] = found[:, there]
-    nearest[at_row, at_column] = middle[at_row, at_column]
+    if columns.stop > columns.start and rows.stop > rows.start:
+        values = np.ascontiguousarray(source.read(columns, rows, factor))
+        _draw(
+            out, nearest, values, *mapping.uncorrected(chainages), arcs, np.array([*~mapping.linear][:6]),
+            np.array([part.rows.start, part.columns.start]), np.array([source.columns, source.rows]),
+            np.array([columns.start, rows.start, factor]),
+        )  # fmt: skip
 
 
 def _window(at: Float, count: int, factor: int) -> slice:
     """Return the pixels of a source image that are needed for coordinates, whole multiples of a factor if possible."""
     low = max(0, (int(np.floor(at.min())) - 1) // factor - 1) * factor
     high = min(count, (int(np.ceil(at.max())) // factor + 2) * factor)
-    return slice(low, max(high, low + 1))
+    return slice(low, high)
 
 
-def _interpolate(values: Single, at: Float) -> Single:
-    """Interpolate values (rows, columns) linearly at coordinates (2, n), passing over NaNs."""
-    valid = np.isfinite(values)
-    if valid.all():
-        return np.asarray(ndimage.map_coordinates(values, at, np.float32, order=1, mode="nearest"))
-    weight = ndimage.map_coordinates(valid.astype(np.float32), at, np.float32, order=1, mode="nearest")
-    total = ndimage.map_coordinates(np.where(valid, values, np.float32(0.0)), at, np.float32, order=1, mode="nearest")
-    enough = weight >= MIN_WEIGHT
-    return np.where(enough, total / np.where(enough, weight, np.float32(1.0)), np.float32(np.nan)).astype(np.float32)
+@kernel
+def _draw(
+    out: Single,
+    nearest: Single,
+    values: Single,
+    along: Float,
+    shift: Float,
+    arcs: Float,
+    inverted: Float,
+    corner: Int64,
+    size: Int64,
+    read: Int64,
+) -> None:  # pragma: no cover - compiled
+    """Interpolate values (bands, rows, columns) linearly into pixels from a corner on, passing over NaNs."""
+    bands, height, width = values.shape
+    found = np.empty(bands, np.float32)
+    for i in range(len(arcs)):
+        for j in range(len(along)):
+            arc = arcs[i] - shift[j]
+            x = inverted[0] * along[j] + inverted[1] * arc + inverted[2]
+            y = inverted[3] * along[j] + inverted[4] * arc + inverted[5]
+            if not (0.0 <= x <= size[0] and 0.0 <= y <= size[1]):
+                continue
+            row, column = corner[0] + i, corner[1] + j
+            far = np.float32(max(abs(x / size[0] - 0.5), abs(y / size[1] - 0.5)))
+            if not far < nearest[row, column]:
+                continue
+            x = min(max((x - read[0]) / read[2] - 0.5, 0.0), width - 1.0)
+            y = min(max((y - read[1]) / read[2] - 0.5, 0.0), height - 1.0)
+            left, top = int(x), int(y)
+            right, below = min(left + 1, width - 1), min(top + 1, height - 1)
+            x, y = x - left, y - top
+            valid = True
+            for band in range(bands):
+                weight, total = 0.0, 0.0
+                for r, c, share in (
+                    (top, left, (1.0 - y) * (1.0 - x)),
+                    (top, right, (1.0 - y) * x),
+                    (below, left, y * (1.0 - x)),
+                    (below, right, y * x),
+                ):
+                    value = values[band, r, c]
+                    if np.isfinite(value):
+                        weight += share
+                        total += share * value
+                valid = valid and weight >= MIN_WEIGHT
+                found[band] = total / max(weight, MIN_WEIGHT)
+            if valid:
+                nearest[row, column] = far
+                for band in range(bands):
+                    out[band, row, column] = found[band]

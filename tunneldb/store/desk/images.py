@@ -51,12 +51,15 @@ class ImageKind:
         Title and unit.
     palette : str
         Kind by which it is coloured: the kind itself, or that of an imported image, as ``thermal``.
+    colour : bool
+        True if it has colours, not values.
     """
 
     kind: str
     label: str
     unit: str
     palette: str
+    colour: bool
 
 
 def image_kinds(conn: psycopg.Connection[Any], survey_id: int) -> list[str]:
@@ -81,14 +84,14 @@ def find_image(conn: psycopg.Connection[Any], survey_id: int, kind: str) -> Imag
 
 
 def _own(kind: str) -> ImageKind:
-    return ImageKind(kind, *KINDS[kind], kind)
+    return ImageKind(kind, *KINDS[kind], kind, kind == RGB)
 
 
 def _imported(conn: psycopg.Connection[Any], survey_id: int) -> list[ImageKind]:
     rows = conn.execute(
-        "SELECT name, kind, unit FROM tunnel_api.imported_image WHERE survey_id = %s ORDER BY name", [survey_id]
+        "SELECT name, kind, unit, colour FROM tunnel_api.imported_image WHERE survey_id = %s ORDER BY name", [survey_id]
     )
-    return [ImageKind(IMPORTED + name, imported_label(name, kind), unit, kind) for name, kind, unit in rows]
+    return [ImageKind(IMPORTED + name, imported_label(name, kind), unit, kind, colour) for name, kind, unit, colour in rows]
 
 
 def blocks(conn: psycopg.Connection[Any], survey_id: int, kind: str, first: int, last: int) -> list[Block]:

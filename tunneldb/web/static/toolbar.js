@@ -4,8 +4,6 @@ import { get, surveyPath } from './api.js';
 import { button, check, choice, el, field } from './dom.js';
 import { number } from './format.js';
 
-const RAMPS = { offset: 'ramp-diverging', deviation: 'ramp-diverging', change: 'ramp-diverging', depth: 'ramp-depth', raw: 'ramp-grey', corrected: 'ramp-grey' };
-
 /** Fill the toolbar of a lining for its survey. */
 export function fillToolbar(lining, onError) {
   const { survey } = lining;
@@ -73,15 +71,14 @@ async function showLegend(lining, onError) {
   const { survey } = lining;
   const kind = survey.kinds.find((other) => other.kind === lining.kind);
   lining.legend.replaceChildren();
-  if (!kind?.unit) return;
+  if (!kind?.ramp.length) return;
   try {
     const { low, high } = await get(surveyPath(survey.name, `/colours/${kind.kind}`));
     if (survey !== lining.survey || kind.kind !== lining.kind) return;
-    const decimals = Math.abs(high - low) < 5 ? 2 : 0;
-    lining.legend.replaceChildren(
-      el('span', { text: number(low, decimals) }), el('i', { class: `ramp ${RAMPS[kind.kind] ?? 'ramp-none'}` }),
-      el('span', { text: number(high, decimals, kind.unit) }),
-    );
+    const decimals = high - low < 5 ? Math.min(Math.max(Math.ceil(1 - Math.log10(high - low)), 2), 6) : 0;
+    const ramp = el('i', { class: 'ramp' });
+    ramp.style.background = `linear-gradient(90deg, ${kind.ramp.join(', ')})`;
+    lining.legend.replaceChildren(el('span', { text: number(low, decimals) }), ramp, el('span', { text: number(high, decimals, kind.unit) }));
   } catch (error) {
     onError(`Colours: ${error.message}`);
   }
