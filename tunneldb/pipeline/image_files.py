@@ -40,6 +40,9 @@ DRIVERS = {
 }
 """Formats of images by their first bytes; others, such as VRT, could make GDAL read other files."""
 
+COLOUR_SCALES = {"uint8": 1.0, "uint16": 1.0 / 257.0}
+"""Factors that bring colours to 0 to 255, by the type of the file's numbers."""
+
 MAX_POINTS = 2000
 """Maximum number of control points."""
 
@@ -135,7 +138,7 @@ def open_image(path: Path, band: int | None = None, scale: float | None = None, 
     band : int, optional
         Band to read, from 1; by default the only one, or the colours.
     scale, offset : float, optional
-        In place of those that the file states.
+        In place of those that the file states; colours have none.
 
     Raises
     ------
@@ -157,11 +160,20 @@ def open_image(path: Path, band: int | None = None, scale: float | None = None, 
             )
         own = image.transform if image.transform != Affine.identity() else None
         points, _ = image.gcps
+        if len(indices) > 1:
+            scale, offset = _colour_scale(path, image.dtypes[first]), 0.0
         return ImageFile(
             path, image.width, image.height, indices, own, tuple((p.col, p.row, p.x, p.y) for p in points),
             image.units[first] or "", image.scales[first] if scale is None else scale,
             image.offsets[first] if offset is None else offset,
         )  # fmt: skip
+
+
+def _colour_scale(path: Path, dtype: str) -> float:
+    """Return the factor that brings colours to 0 to 255."""
+    if dtype not in COLOUR_SCALES:
+        raise InputError(f"{path}: its colours have the type {dtype}; save them with 8 or 16 bits, or choose a band by --band")
+    return COLOUR_SCALES[dtype]
 
 
 def _bands(path: Path, image: Any, band: int | None) -> tuple[int, ...]:
