@@ -193,9 +193,10 @@ def test_frames_that_fit_badly_are_warned_of(example: str, tmp_path: Path) -> No
     assert "differ by up to 25 %" in warnings[2]
 
 
-def test_photos_keep_their_colours(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:
-    photo = np.zeros((3, 400, 600), np.uint8)
-    photo[0, :, :300], photo[1, :, 300:], photo[2] = 200, 150, 30
+@pytest.mark.parametrize(("dtype", "step"), [(np.uint8, 1), (np.uint16, 257)])
+def test_photos_keep_their_colours(conn: psycopg.Connection, example: str, tmp_path: Path, dtype: type, step: int) -> None:
+    photo = np.zeros((3, 400, 600), dtype)
+    photo[0, :, :300], photo[1, :, 300:], photo[2] = 200 * step, 150 * step, 30 * step
     told("image", "import", NAME, write(tmp_path / "p.tif", photo, STATED, photometric="RGB"), "--kind", "photo")
     run("image", NAME, "-o", tmp_path)
     with rasterio.open(tmp_path / f"{NAME}-km012-imported-photo.tif") as written:
@@ -203,7 +204,7 @@ def test_photos_keep_their_colours(conn: psycopg.Connection, example: str, tmp_p
         for chainage, colour in ((WEST + 3.0, (200, 0, 30, 255)), (WEST + 9.0, (0, 150, 30, 255)), (WEST + 20.0, (0, 0, 0, 0))):
             column, row = ~written.transform @ (chainage, TOP - 4.0)
             found = written.read(window=((int(row), int(row) + 1), (int(column), int(column) + 1)))[:, 0, 0]
-            assert found.tolist() == pytest.approx(colour, abs=8), chainage
+            assert found.tolist() == list(colour), chainage
 
 
 @pytest.mark.parametrize(
@@ -229,6 +230,7 @@ def test_wrong_files_are_refused(example: str, tmp_path: Path) -> None:
     vrt.write_text(f'<VRTDataset rasterXSize="1" rasterYSize="1"><SourceFilename>{good}</SourceFilename></VRTDataset>')
     utm = write(tmp_path / "utm.tif", np.ones((80, 100), np.float32), STATED, crs="EPSG:25833")
     five = write(tmp_path / "five.tif", np.ones((5, 80, 100), np.float32), STATED)
+    real = write(tmp_path / "real.tif", np.ones((3, 80, 100), np.float32), STATED, photometric="RGB")
     outside = tmp_path / "outside.csv"
     outside.write_text("column,row,chainage,arc\n1,2,12310,1\n500,2,12320,1\n")
     mirrored = tmp_path / "frames.csv"
@@ -240,6 +242,7 @@ def test_wrong_files_are_refused(example: str, tmp_path: Path) -> None:
         ([tmp_path / "none.tif"], "no such file"),
         ([utm], "has the coordinate system ETRS89 / UTM zone 33N"),
         ([five], "has 5 bands; choose one by --band"),
+        ([real], "its colours have the type float32"),
         ([five, "--band", 6], "--band 6: it has 5"),
         ([good, "--points", outside], "line 3: column 500, row 2 is outside the image"),
         ([mirrored], "line 2: the image is mirrored"),

@@ -107,11 +107,16 @@ def at(dock: Any) -> int | None:
     return None if current is None else current.id
 
 
+def pictures(dock: Any) -> dict[str, bool]:
+    """Whether each kind of image is shown."""
+    return {kind: view.image is not None and not view.missing for kind, view in dock.views.items()}
+
+
 def review(dock: Any) -> dict[str, Any]:
     """Step, confirm, reject, name, remark and take back by keys."""
     window = qgis.utils.iface.window
     seen: dict[str, Any] = {"order": [finding.id for finding in dock.session.work.findings], "first": at(dock)}
-    seen["pictures"] = {kind: view.image is not None and not view.missing for kind, view in dock.views.items()}
+    seen["pictures"] = pictures(dock)
     box = dock.session.work.current
     box = QgsRectangle(box.chainage_from, box.arc_from, box.chainage_to, box.arc_to)
     seen["followed"] = qgis.utils.iface.canvas.extent().contains(box) and qgis.utils.iface.canvas.extent().width() < 100
@@ -209,6 +214,7 @@ def main() -> None:
     wait(plugin.dock)
     seen["connected"] = plugin.dock.message.text()
     if len(sys.argv) > 5:
+        seen["pictures"] = pictures(plugin.dock)
         press(plugin.dock, Qt.Key_C)
         seen["refused"] = plugin.dock.message.text()
     else:

@@ -17,6 +17,7 @@ import psycopg
 import pytest
 from click.testing import CliRunner
 from psycopg.conninfo import conninfo_to_dict
+from support.coloured_image import add_image_in_colour
 from support.qgis import ENVIRONMENT, PYTHON, has_qgis
 from support.system import missing
 
@@ -196,10 +197,12 @@ def test_an_inspector_reviews_by_keys(
     assert not [key for key in seen["settings"] if "password" in key]
 
 
-def test_a_viewer_is_told_that_she_may_not(
+def test_a_viewer_sees_the_images_and_is_told_that_she_may_not(
     unpacked: Path, tmp_path: Path, conn: psycopg.Connection, dsn: str, example: str, people: None
 ) -> None:
+    add_image_in_colour(conn, example)
     seen = in_qgis(unpacked, tmp_path, dsn, "vera")
+    assert seen["pictures"] == dict.fromkeys(("raw", "corrected", "rgb", "offset"), True)
     assert "may look, but not review" in seen["refused"]
     assert conn.execute("SELECT count(*) FROM tunnel_api.audit WHERE who = 'vera'").fetchone() == (0,)
 

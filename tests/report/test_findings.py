@@ -28,6 +28,7 @@ from support.example_survey import NAME
 
 from tunneldb.cli.main import main
 from tunneldb.database import connect
+from tunneldb.database.models.imported_image import KINDS as IMPORTED_KINDS
 from tunneldb.errors import UserError
 from tunneldb.export.tables.finding_counts import DARK, LEAKS, OTHERS, UNCOUNTED
 from tunneldb.report import actions, findings
@@ -539,6 +540,7 @@ def example_catalogue() -> frozenset[str]:
     texts |= set(GAP_STATES) | {"Not searched for leaks: {stretches}", "Searched, with gaps: {stretches}"}
     texts |= set(CHANGE_WORDS.values()) | {"Chainage", "Station", "o’clock", "m²", "Client", "Project"}
     texts |= {"Prepared by", "Checked by", "Accepted by", "Name", "Position", "Date", "Signature"}
+    texts |= {*IMPORTED_KINDS, "coordinates", "frames", "similarity", "affine", "piecewise"}
     texts |= {value for name, value in vars(trouble).items() if name.isupper()}
     baseline = (Path(__file__).parents[2] / "migrations" / "baseline" / "finding.sql").read_text("utf-8")
     texts |= set(re.findall(r"^    \('\w+', '([^']+)', '{", baseline, re.MULTILINE))

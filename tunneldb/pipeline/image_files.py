@@ -15,7 +15,7 @@ import rasterio
 from affine import Affine
 from pyproj import CRS
 from pyproj.exceptions import CRSError
-from rasterio.enums import ColorInterp
+from rasterio.enums import ColorInterp, MaskFlags
 from rasterio.errors import NotGeoreferencedWarning, RasterioError
 from rasterio.windows import Window
 
@@ -29,6 +29,7 @@ from tunneldb.raster.overview import shrink
 from tunneldb.raster.placement.mapping import AffineMapping
 from tunneldb.raster.placement.resample import Frame
 from tunneldb.store.survey import Survey
+from tunneldb.threads import threads
 
 DRIVERS = {
     b"II*\0": "GTiff",
@@ -39,6 +40,9 @@ DRIVERS = {
     b"\xff\xd8\xff": "JPEG",
 }
 """Formats of images by their first bytes; others, such as VRT, could make GDAL read other files."""
+
+COLOUR_SCALES = {"uint8": 1.0, "uint16": 1.0 / 257.0}
+"""Factors that bring colours to 0 to 255, by the type of the file's numbers."""
 
 MAX_POINTS = 2000
 """Maximum number of control points."""
@@ -84,17 +88,21 @@ class ImageFile:
 
     def read(self, columns: slice, rows: slice, factor: int) -> Single:
         """Return pixels (bands, rows, columns), averaged over ``factor`` × ``factor``, NaN without a value."""
-        height = max(1, _PART // (columns.stop - columns.start) // factor) * factor
-        parts = []
+        count = rows.stop - rows.start
+        height = count if factor == 1 else max(1, _PART // (columns.stop - columns.start) // factor) * factor
+        indices, parts = list(self.indices), []
         with _opened(self.path) as image:
+            masked = any(MaskFlags.all_valid not in image.mask_flag_enums[index - 1] for index in indices)
             for start in range(rows.start, rows.stop, height):
                 window = Window(columns.start, start, columns.stop - columns.start, min(height, rows.stop - start))
-                found = image.read(list(self.indices), window=window, masked=True).astype(np.float32).filled(np.nan)
+                found: Single = image.read(indices, window=window, out_dtype="float32")
+                if masked:
+                    found[image.read_masks(indices, window=window) == 0] = np.nan
+                if (self.scale, self.offset) != (1.0, 0.0):
+                    found *= np.float32(self.scale)
+                    found += np.float32(self.offset)
                 parts.append(np.stack([shrink(band, factor) for band in found]) if factor > 1 else found)
-        values = np.concatenate(parts, axis=1)
-        if (self.scale, self.offset) != (1.0, 0.0):
-            values = values * np.float32(self.scale) + np.float32(self.offset)
-        return np.asarray(values, dtype=np.float32)
+        return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
 
     def value_range(self) -> tuple[float, float]:
         """Return the least and the greatest value; infinite if it has none."""
@@ -102,9 +110,9 @@ class ImageFile:
         step = max(1, _PART // self.columns)
         for start in range(0, self.rows, step):
             values = self.read(slice(0, self.columns), slice(start, min(start + step, self.rows)), 1)
-            finite = values[np.isfinite(values)]
-            if len(finite):
-                low, high = min(low, float(finite.min())), max(high, float(finite.max()))
+            finite = np.isfinite(values)
+            low = min(low, float(values.min(where=finite, initial=np.inf)))
+            high = max(high, float(values.max(where=finite, initial=-np.inf)))
         return low, high
 
 
@@ -118,7 +126,8 @@ def _opened(path: Path) -> Iterator[Any]:
             raise InputError(f"{path} is no GeoTIFF, PNG or JPEG; save it as GeoTIFF")
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", NotGeoreferencedWarning)
-            with rasterio.open(path, driver=driver) as image:
+            options = {"num_threads": threads()} if driver == "GTiff" else {}
+            with rasterio.open(path, driver=driver, **options) as image:
                 yield image
     except RasterioError as error:
         raise InputError(f"{path}: cannot be read as {driver}: {gdal_fault(error.__cause__ or error)}") from None
@@ -135,7 +144,7 @@ def open_image(path: Path, band: int | None = None, scale: float | None = None, 
     band : int, optional
         Band to read, from 1; by default the only one, or the colours.
     scale, offset : float, optional
-        In place of those that the file states.
+        In place of those that the file states; colours have none.
 
     Raises
     ------
@@ -157,11 +166,20 @@ def open_image(path: Path, band: int | None = None, scale: float | None = None, 
             )
         own = image.transform if image.transform != Affine.identity() else None
         points, _ = image.gcps
+        if len(indices) > 1:
+            scale, offset = _colour_scale(path, image.dtypes[first]), 0.0
         return ImageFile(
             path, image.width, image.height, indices, own, tuple((p.col, p.row, p.x, p.y) for p in points),
             image.units[first] or "", image.scales[first] if scale is None else scale,
             image.offsets[first] if offset is None else offset,
         )  # fmt: skip
+
+
+def _colour_scale(path: Path, dtype: str) -> float:
+    """Return the factor that brings colours to 0 to 255."""
+    if dtype not in COLOUR_SCALES:
+        raise InputError(f"{path}: its colours have the type {dtype}; save them with 8 or 16 bits, or choose a band by --band")
+    return COLOUR_SCALES[dtype]
 
 
 def _bands(path: Path, image: Any, band: int | None) -> tuple[int, ...]:

@@ -13,12 +13,16 @@ from tunneldb.compiled import kernel
 from tunneldb.raster.geotiff import Raster
 from tunneldb.raster.grid import BLOCK, Grid
 from tunneldb.raster.placement.mapping import Bounds, Mapping, inverse, pixel_sides
+from tunneldb.threads import in_blocks
 
 PIXELS = (0.002, 0.0025, 0.004, 0.005, 0.01, 0.02, 0.025, 0.04, 0.05, 0.1, 0.2, 0.25, 0.5, 1.0)
 """Sides of the pixels of imported images, m: they divide a block of 50 m."""
 
 PART = 1 << 24
 """Number of pixels that are computed at once."""
+
+ROWS = 256
+"""Number of rows that a thread computes at once."""
 
 MAX_SOURCE = 1 << 26
 """Maximum number of pixels of a source image that are read at once."""
@@ -158,11 +162,14 @@ def _add(out: Single, nearest: Single, frame: Frame, part: _Part) -> None:
         factor *= 2
     if columns.stop > columns.start and rows.stop > rows.start:
         values = np.ascontiguousarray(source.read(columns, rows, factor))
-        _draw(
-            out, nearest, values, *mapping.uncorrected(chainages), arcs, np.array([*~mapping.linear][:6]),
-            np.array([part.rows.start, part.columns.start]), np.array([source.columns, source.rows]),
-            np.array([columns.start, rows.start, factor]),
-        )  # fmt: skip
+        places = *mapping.uncorrected(chainages), arcs, np.array([*~mapping.linear][:6])
+        corner = np.array([part.rows.start, part.columns.start])
+        size, origin = np.array([source.columns, source.rows]), np.array([columns.start, rows.start, factor])
+
+        def draw(begin: int, end: int) -> None:
+            _draw(out, nearest, values, *places, corner, size, origin, begin, end)
+
+        in_blocks(draw, len(arcs), ROWS)
 
 
 def _window(at: Float, count: int, factor: int) -> slice:
@@ -184,11 +191,14 @@ def _draw(
     corner: Int64,
     size: Int64,
     read: Int64,
+    begin: int,
+    end: int,
 ) -> None:  # pragma: no cover - compiled
-    """Interpolate values (bands, rows, columns) linearly into pixels from a corner on, passing over NaNs."""
+    """Interpolate values (bands, rows, columns) linearly into some rows from a corner on, passing over NaNs."""
     bands, height, width = values.shape
     found = np.empty(bands, np.float32)
-    for i in range(len(arcs)):
+    per_column, per_row, per_pixel = 1.0 / size[0], 1.0 / size[1], 1.0 / read[2]
+    for i in range(begin, end):
         for j in range(len(along)):
             arc = arcs[i] - shift[j]
             x = inverted[0] * along[j] + inverted[1] * arc + inverted[2]
@@ -196,11 +206,11 @@ def _draw(
             if not (0.0 <= x <= size[0] and 0.0 <= y <= size[1]):
                 continue
             row, column = corner[0] + i, corner[1] + j
-            far = np.float32(max(abs(x / size[0] - 0.5), abs(y / size[1] - 0.5)))
+            far = np.float32(max(abs(x * per_column - 0.5), abs(y * per_row - 0.5)))
             if not far < nearest[row, column]:
                 continue
-            x = min(max((x - read[0]) / read[2] - 0.5, 0.0), width - 1.0)
-            y = min(max((y - read[1]) / read[2] - 0.5, 0.0), height - 1.0)
+            x = min(max((x - read[0]) * per_pixel - 0.5, 0.0), width - 1.0)
+            y = min(max((y - read[1]) * per_pixel - 0.5, 0.0), height - 1.0)
             left, top = int(x), int(y)
             right, below = min(left + 1, width - 1), min(top + 1, height - 1)
             x, y = x - left, y - top
