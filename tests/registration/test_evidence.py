@@ -7,7 +7,7 @@ import pytest
 
 from tunneldb.arrays import Float
 from tunneldb.registration.underwater.adjustment import weights_of
-from tunneldb.registration.underwater.choice import explained, margin
+from tunneldb.registration.underwater.choice import Cells, explained, margin
 from tunneldb.registration.underwater.observations import Patches, Pose, profile_rows, wall_rows, waterline_rows
 from tunneldb.registration.underwater.walls import Walls, find_walls
 from tunneldb.registration.underwater.water_surface import Level, surface_noise
@@ -54,7 +54,7 @@ def test_an_upright_surface_in_open_water_is_evidence_against_a_pose() -> None:
     right, wrong = (explained(points, upright, pose, walls, ()) for pose in (true, pose_at(6.0)))
     assert np.nanmean(right.ratio[3000:]) > 3.0
     assert np.nanmean(wrong.ratio[3000:]) < 0.1
-    assert margin(points, right, wrong) > 1.5
+    assert margin(Cells.of(points), right, wrong) > 1.5
     unknown = explained(points, ~upright, pose_at(6.0), walls, ())
     assert np.isnan(unknown.ratio[3000:]).all()  # as points of the bed, which the laser does not show
 

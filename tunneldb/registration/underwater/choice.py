@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tunneldb.arrays import Bool, Float
+from tunneldb.arrays import Bool, Float, Int64
 from tunneldb.registration.underwater.ladder_shape import PlacedLadder, nearest_element
 from tunneldb.registration.underwater.observations import BEAM_SIGMA, MAX_RANGE, RANGE_NOISE, RELIEF, Pose, cell_keys
 from tunneldb.registration.underwater.walls import Walls
@@ -37,10 +37,18 @@ class Evidence:
         or the laser shows no wall there.
     ladder : (n,) bool array
         True if a ladder explains the point best.
+    walls : (n,) float64 array
+        The ratio by walls alone.
     """
 
     ratio: Float
     ladder: Bool
+    walls: Float
+
+    @property
+    def by_walls(self) -> Evidence:
+        """The same without ladders."""
+        return Evidence(self.walls, np.zeros(len(self.walls), np.bool_), self.walls)
 
 
 def explained(points: Float, upright: Bool, pose: Pose, walls: Walls, ladders: Sequence[PlacedLadder]) -> Evidence:
@@ -62,6 +70,7 @@ def explained(points: Float, upright: Bool, pose: Pose, walls: Walls, ladders: S
     profile_away, _ = walls.profile.tree.query(space[:, :2], distance_upper_bound=PROFILE_REACH)
     there = np.isfinite(profile_away)
     best[there] = np.minimum(best[there], (profile_away[there] / np.hypot(sigma[there], PROFILE_SIGMA)) ** 2)
+    by_walls = _log_ratio(best, usable)
     by_ladder = np.zeros(len(points), np.bool_)
     for placed in ladders:
         own = placed.to_ladder(space)
@@ -72,8 +81,13 @@ def explained(points: Float, upright: Bool, pose: Pose, walls: Walls, ladders: S
             deviation = _ladder_deviation(own[near], placed, pose)
             by_ladder[near] |= deviation < best[near]
             best[near] = np.minimum(best[near], deviation)
-    ratio = HALF_EXPLAINED_SIGMA**2 / (2.0 * (1.0 + best / HALF_EXPLAINED_SIGMA**2))
-    return Evidence(np.where(usable & np.isfinite(best), ratio, np.nan), by_ladder)
+    return Evidence(_log_ratio(best, usable), by_ladder, by_walls)
+
+
+def _log_ratio(deviation: Float, usable: Bool) -> Float:
+    """Return log likelihood ratios (n,) of squared deviations (n,), in standard deviations; NaN if undefined."""
+    ratio = HALF_EXPLAINED_SIGMA**2 / (2.0 * (1.0 + deviation / HALF_EXPLAINED_SIGMA**2))
+    return np.where(usable & np.isfinite(deviation), ratio, np.nan)
 
 
 def _ladder_deviation(own: Float, placed: PlacedLadder, pose: Pose) -> Float:
@@ -90,16 +104,40 @@ def _ladder_deviation(own: Float, placed: PlacedLadder, pose: Pose) -> Float:
     return np.asarray((along / RANGE_NOISE) ** 2 + across / (BEAM_SIGMA * reach) ** 2)
 
 
-def margin(points: Float, one: Evidence, other: Evidence) -> float:
-    """Return by how many standard deviations one pose explains points (n, 3) better than another.
+@dataclass(frozen=True)
+class Cells:
+    """Cells of points, within which errors are correlated; numbered from 0.
+
+    Attributes
+    ----------
+    column, cube : (n,) int arrays
+        Upright column, for points of walls, and cube, for points of ladders. Cubes have numbers after those of columns.
+    count : int
+        Number of all.
+    """
+
+    column: Int64
+    cube: Int64
+    count: int
+
+    @classmethod
+    def of(cls, points: Float) -> Cells:
+        """Find the cells of points (n, 3)."""
+        columns, column = np.unique(cell_keys(points * [1.0, 1.0, 0.0], COLUMN), return_inverse=True)
+        cubes, cube = np.unique(cell_keys(points, CELL), return_inverse=True)
+        return cls(column, cube + len(columns), len(columns) + len(cubes))
+
+
+def margin(cells: Cells, one: Evidence, other: Evidence) -> float:
+    """Return by how many standard deviations one pose explains points better than another.
 
     Only points that both poses explain are included: walls that are known farther along under one pose are no evidence.
     """
-    both = np.isfinite(one.ratio) & np.isfinite(other.ratio)
-    bar = (one.ladder | other.ladder)[both]
-    column = cell_keys(points[both] * [1.0, 1.0, 0.0], COLUMN)
-    key = np.where(bar, -cell_keys(points[both], CELL), column)
-    _, number, count = np.unique(key, return_inverse=True, return_counts=True)
-    difference = np.bincount(number, (one.ratio - other.ratio)[both]) / count
-    spread = float(np.sqrt((difference**2).sum()))
-    return float(difference.sum()) / spread if spread > 0.0 else 0.0
+    difference = one.ratio - other.ratio
+    both = np.isfinite(difference)
+    cell = np.where(one.ladder | other.ladder, cells.cube, cells.column)[both]
+    count = np.bincount(cell, minlength=cells.count)
+    total = np.bincount(cell, difference[both], minlength=cells.count)
+    mean = total[count > 0] / count[count > 0]
+    spread = float(np.sqrt((mean**2).sum()))
+    return float(mean.sum()) / spread if spread > 0.0 else 0.0

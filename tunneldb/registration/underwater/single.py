@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -12,7 +13,7 @@ from scipy.special import log_ndtr
 from tunneldb.arrays import Bool, Float
 from tunneldb.errors import UserError
 from tunneldb.registration.underwater.adjustment import SCALE_SIGMA, Scan, fit, scan_of
-from tunneldb.registration.underwater.choice import MIN_MARGIN, Evidence, explained, margin
+from tunneldb.registration.underwater.choice import MIN_MARGIN, Cells, Evidence, explained, margin
 from tunneldb.registration.underwater.first_pose import Candidate, LevelScan, candidates, level, likeness
 from tunneldb.registration.underwater.laser_ladders import LaserLadder
 from tunneldb.registration.underwater.observations import (
@@ -300,17 +301,17 @@ def _distinct(fitted: Sequence[_Fitted]) -> list[_Fitted]:
 def _weighed(scan: PreparedScan, fitted: Sequence[_Fitted], walls: Walls, found: Sequence[LaserLadder]) -> list[Hypothesis]:
     """Return candidates with their odds against the best one: by all points, the water's level, and ladders in sight."""
     evidence = [_evidence(scan, one.pose, walls, found) for one in fitted]
-    plan = [explained(scan.thin, scan.upright, one.pose, walls, ()) for one in fitted]
     other = np.array([_log_prior(scan, one) for one in fitted])
 
-    def log_odds(k: int, best: int) -> float:
-        lead = margin(scan.thin, evidence[best], evidence[k])
-        return float(log_ndtr(-lead) - log_ndtr(lead) + other[k] - other[best])
-
-    table = np.array([[0.0 if k == best else log_odds(k, best) for k in range(len(fitted))] for best in range(len(fitted))])
+    cells = Cells.of(scan.thin)
+    lead = np.zeros((len(fitted), len(fitted)))  # of the first pose over the second
+    for k, best in combinations(range(len(fitted)), 2):
+        lead[best, k] = margin(cells, evidence[best], evidence[k])
+    lead -= lead.T
+    table = log_ndtr(-lead) - log_ndtr(lead) + other - other[:, None]
     best = int(np.argmin(table.max(axis=1)))
     away = [k for k in range(len(fitted)) if not _same_plan(fitted[k].pose, fitted[best].pose)]
-    by_plan = all(margin(scan.thin, plan[best], plan[k]) > MIN_MARGIN for k in away)
+    by_plan = all(margin(cells, evidence[best].by_walls, evidence[k].by_walls) > MIN_MARGIN for k in away)
     out = [Hypothesis(one.pose, one.ladders, float(table[best, k]), k == best and by_plan) for k, one in enumerate(fitted)]
     return sorted(out, key=lambda one: -one.log_odds)
 
