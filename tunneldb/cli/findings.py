@@ -11,6 +11,7 @@ import click
 import psycopg
 
 from tunneldb.cli.coverage import say_coverage, say_remarks
+from tunneldb.cli.findings_trace import trace
 from tunneldb.cli.leaks import parse_clock
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import DefaultGroup, add_to_json, notify, printable, records
@@ -39,7 +40,10 @@ from tunneldb.store.survey import Survey, get_survey
 
 @click.group(cls=DefaultGroup)
 def findings() -> None:
-    """List, export, import or undo findings of all kinds, detected or drawn."""
+    """List, export, import, trace or undo findings of all kinds, detected or drawn."""
+
+
+findings.add_command(trace)
 
 
 @findings.command(

@@ -109,8 +109,21 @@ class ImportedResult:
 
 
 @dataclass
-class _Placement:
-    """Frames of an image with their extent, and the control points, if there are any."""
+class Placement:
+    """Frames of an image with their extent.
+
+    Attributes
+    ----------
+    frames : list of Frame
+    placed : Placed
+        Extent with warnings.
+    way : str
+        coordinates, points or frames.
+    fit : ControlFit, optional
+    points : list of ControlPoint
+    notes : list of str
+        Remarks about the control points.
+    """
 
     frames: list[Frame]
     placed: Placed
@@ -135,7 +148,7 @@ def import_image(
         If a file cannot be read, or the image cannot be placed in the survey.
     """
     lining = Lining(*section_extent(conn, survey))
-    done = _place(conn, survey, path, settings, lining)
+    done = place_image(conn, survey, path, settings, lining)
     sources = [frame.source for frame in done.frames]
     low, high = _value_range(path, sources, progress)
     first = sources[0]
@@ -260,12 +273,21 @@ def _checked_pixel(pixel: float, given: bool, placed: Placed, lining: Lining) ->
     return pixel
 
 
-def _place(conn: psycopg.Connection[Any], survey: Survey, path: Path, settings: ImportSettings, lining: Lining) -> _Placement:
+def place_image(
+    conn: psycopg.Connection[Any], survey: Survey, path: Path, settings: ImportSettings, lining: Lining
+) -> Placement:
+    """Open an image or a table of frames, and place it in the unrolled plane.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be read, or the image does not fit the survey.
+    """
     if path.suffix.lower() in TABLES:
         if settings.points is not None:
             raise InputError(f"{path} is a table of frames, which states places itself: leave out --points")
         frames = read_frames(conn, survey, path, settings.band, settings.scale, settings.offset)
-        return _Placement(frames, _union(frames, lining), "frames")
+        return Placement(frames, _union(frames, lining), "frames")
     image = open_image(path, settings.band, settings.scale, settings.offset)
     if settings.points is not None or (image.transform is None and image.ground):
         controls = own_controls(image) if settings.points is None else read_controls(conn, survey, settings.points, image)
@@ -280,7 +302,7 @@ def _place(conn: psycopg.Connection[Any], survey: Survey, path: Path, settings: 
         placed = check_placement(mapping, image.columns, image.rows, lining)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    return _Placement([Frame(image, mapping)], placed, "coordinates")
+    return Placement([Frame(image, mapping)], placed, "coordinates")
 
 
 def _union(frames: Sequence[Frame], lining: Lining) -> Placed:
@@ -305,7 +327,7 @@ def _union(frames: Sequence[Frame], lining: Lining) -> Placed:
     return placed
 
 
-def _by_points(path: Path, image: ImageFile, controls: Controls, lining: Lining) -> _Placement:
+def _by_points(path: Path, image: ImageFile, controls: Controls, lining: Lining) -> Placement:
     try:
         fit = fit_control(controls.pixels, controls.places)
         warnings = check_fit(fit)
@@ -331,7 +353,7 @@ def _by_points(path: Path, image: ImageFile, controls: Controls, lining: Lining)
                 f" {along:+.3f} m along and {around:+.3f} m around the tunnel"
             )
     placed.warnings.extend(warnings)
-    return _Placement([Frame(image, fit.mapping)], placed, "points", fit, points, notes)
+    return Placement([Frame(image, fit.mapping)], placed, "points", fit, points, notes)
 
 
 def _control_point(name: str, pixel: Float, place: Float, residual: Float, outlier: bool) -> ControlPoint:
