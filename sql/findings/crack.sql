@@ -1,8 +1,8 @@
 -- Density of cracks by element. Needs element_boxes and element_parts (measures/rating.sql), and line_orientation
 -- (findings/orientation.sql).
 
--- The lining is the length of the element times the girth of its sections, searched for leaks or not: cracks can come from photos of
--- a survey without detection.
+-- The lining is the length of the element times the girth of its sections, without the ground, searched for leaks or not: cracks can
+-- come from photos of a survey without detection.
 CREATE OR REPLACE FUNCTION tunnel_internal.element_cracks(survey_id int, set_id int)
 RETURNS TABLE (element_id int, lining float8, cracks int, length float8, longitudinal float8, transverse float8, oblique float8,
     width_mm float8)
@@ -14,19 +14,20 @@ DECLARE
     set_key constant int := set_id;
 BEGIN
     RETURN QUERY
-    WITH box AS MATERIALIZED (
-        SELECT b.element_id, min(b.low) AS low, min(b.high) AS high, sum(b.girth_share) AS share
-          FROM tunnel_internal.element_boxes(survey_key, set_key) b GROUP BY b.element_id
-    ), extent AS (
-        SELECT b.element_id, (b.high - b.low) * b.share * coalesce(inside.girth, near.girth) AS lining
-          FROM box b
+    WITH extent AS (
+        SELECT b.element_id, sum((b.high - b.low) * coalesce(above.girth, inside.girth, near.girth)) AS lining
+          FROM tunnel_internal.element_boxes(survey_key, set_key) b
          CROSS JOIN LATERAL (
-               SELECT avg(s.arc[cardinality(s.arc)] - s.arc[1]) AS girth FROM tunnel.section s
+               SELECT avg(greatest(least(b.arc_to, g.arc_right) - greatest(b.arc_from, g.arc_left), 0)) AS girth FROM tunnel.ground g
+                WHERE g.survey_id = survey_key AND g.n BETWEEN floor(b.low) AND ceil(b.high)) above
+         CROSS JOIN LATERAL (
+               SELECT avg(least(b.arc_to, s.arc[cardinality(s.arc)]) - greatest(b.arc_from, s.arc[1])) AS girth FROM tunnel.section s
                 WHERE s.survey_id = survey_key AND s.chainage BETWEEN b.low AND b.high) inside
           LEFT JOIN LATERAL (
-               SELECT s.arc[cardinality(s.arc)] - s.arc[1] AS girth FROM tunnel.section s
+               SELECT least(b.arc_to, s.arc[cardinality(s.arc)]) - greatest(b.arc_from, s.arc[1]) AS girth FROM tunnel.section s
                 WHERE s.survey_id = survey_key AND s.chainage BETWEEN b.low - 50 AND b.high + 50
                 ORDER BY abs(s.chainage - (b.low + b.high) / 2) LIMIT 1) near ON true
+         GROUP BY b.element_id
     ), part AS (
         SELECT p.element_id, count(*)::int AS cracks, sum(p.length) AS length, max(p.width_mm) AS width_mm,
                sum(p.length) FILTER (WHERE c.class = 'longitudinal') AS longitudinal,
@@ -69,7 +70,7 @@ COMMENT ON COLUMN tunnel_api.crack_density.chainage_from IS 'Chainage of its beg
 COMMENT ON COLUMN tunnel_api.crack_density.chainage_to IS 'Chainage of its end, m';
 COMMENT ON COLUMN tunnel_api.crack_density.label_from IS 'Station of its beginning, as 12+345.678';
 COMMENT ON COLUMN tunnel_api.crack_density.label_to IS 'Station of its end';
-COMMENT ON COLUMN tunnel_api.crack_density.lining_area IS 'Lining of the element within the survey, m²: length times girth of the sections';
+COMMENT ON COLUMN tunnel_api.crack_density.lining_area IS 'Lining of the element within the survey, m²: length times girth of the sections, without the ground if stage ground found it';
 COMMENT ON COLUMN tunnel_api.crack_density.cracks IS 'Number of counted cracks that reach into it';
 COMMENT ON COLUMN tunnel_api.crack_density.crack_length IS 'Length of their parts in it, m';
 COMMENT ON COLUMN tunnel_api.crack_density.density IS 'Length of cracks by area of lining, m per m²; NULL outside the survey';

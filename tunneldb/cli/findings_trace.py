@@ -34,8 +34,8 @@ from tunneldb.store.survey import get_survey
 def trace(settings: Settings, survey: str, file: Path, points: Path | None, band: int | None, min_length: float) -> None:
     """Trace the cracks of a mask and add them to SURVEY as open findings of kind crack.
 
-    FILE is a PNG, GeoTIFF or JPEG whose pixels are 0, and one other value in cracks; or a CSV of frames. It is placed
-    as by image import: by its own coordinates, by control points (--points), or by the table of frames. The areas
+    FILE is a PNG or GeoTIFF whose pixels are 0, and one other value in cracks; or a CSV of frames. It is placed as by
+    image import: by its own coordinates, by control points (--points), or by the table of frames. The areas
     are thinned to lines. A crack has the length of its line, and as width the area of the mask divided by the length.
 
     Shorter lines than --min-length are left out, also areas wider than 100 mm, and lines beyond the lining.

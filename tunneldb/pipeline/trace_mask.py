@@ -36,7 +36,7 @@ HALO = 128
 MAX_PIXELS = 20_000_000
 """Maximum number of pixels of a mask that are not 0."""
 
-MAX_SHARE = 0.25
+MAX_SHARE = 0.5
 """Share of such pixels from which a mask is refused as inverted."""
 
 MAX_WIDTH = 100.0
@@ -161,20 +161,12 @@ def _traced(
     """Return the lines of all frames, each of the part of a frame whose middle is nearer than that of the others."""
     advance = progress("masks", len(frames))
     lines = []
-    total = pixels = 0
     for number, frame in enumerate(frames):
         thinned, mask = read_mask(path, frame.source)
-        total += len(mask)
-        pixels += frame.source.columns * frame.source.rows
         others = [other for other in frames if other is not frame]
         own = [places[_is_nearest(frame, others, places)] for places in (thinned, mask)]
         lines += _placed(frame, number, *own)
         advance(1)
-    if total > MAX_SHARE * pixels:
-        raise InputError(
-            f"{path}: {100 * total / pixels:.0f} % of the mask's pixels are not 0; the pixels of cracks are not 0, all others 0:"
-            " invert the mask"
-        )
     return lines
 
 
@@ -220,7 +212,8 @@ def read_mask(path: Path, source: Source) -> tuple[Int64, Int64]:
         If it has several values besides 0, or too many pixels.
     """
     width = max(2 * HALO, PART // source.rows)
-    thinned, mask = [], []
+    thinned: list[Int64] = []
+    mask: list[Int64] = []
     values: set[tuple[float, ...]] = set()
     for start in range(0, source.columns, width):
         low, high = max(0, start - HALO), min(source.columns, start + width + HALO)
@@ -235,11 +228,15 @@ def read_mask(path: Path, source: Source) -> tuple[Int64, Int64]:
                 f"{path}: the mask has several values besides 0, such as {listed}; write one with 0 and one other value, for"
                 " cracks"
             )
+        if there.mean() > MAX_SHARE:
+            raise InputError(
+                f"{path}: {100 * there.mean():.0f} % of the mask's pixels are not 0; invert it: only pixels of cracks are not 0"
+            )
         core = slice(start - low, min(start + width, source.columns) - low)
         for image, places in ((thin(there), thinned), (there, mask)):
             at = np.argwhere(image[:, core])
             at[:, 1] += start
             places.append(at)
-        if sum(map(len, mask)) > MAX_PIXELS:
-            raise InputError(f"{path}: more than {MAX_PIXELS} pixels of the mask are not 0; is it inverted? Else divide it")
+        if sum(len(places) for places in mask) > MAX_PIXELS:
+            raise InputError(f"{path}: more than {MAX_PIXELS} pixels of the mask are not 0; divide it")
     return np.concatenate(thinned), np.concatenate(mask)
