@@ -195,8 +195,8 @@ def _read_csv(
     texts = {name: found for name in (*COLUMNS, *_PLACES) if (found := column(name)) is not None}
     if "kind" in needed and "kind" not in texts:
         raise UserError(
-            f"{path} has no column kind: say which by --column kind=THEIRS, or the kind of all by --kind; its header is"
-            f" {','.join(header)!r}"
+            f"{path} has no column kind: say which by --column kind=THEIRS; its header is {','.join(header)!r}; or say the kind"
+            " of all by --kind"
         )
     ways = [way for way in _WAYS if all(name in texts for name in way)]
     if not ways:
