@@ -22,7 +22,7 @@ TOPICS = {
     "Design profile": ("deviation", "deviation_layer", "thickness", "evenness"),
     "Clearance": ("clearance", "clearance_layer"),
     "Rings": ("rings",),
-    "Elements and ratings": ("rating", "rating_layer"),
+    "Elements and ratings": ("rating", "rating_layer", "crack"),
     "Actions": ("action",),
     "Alarms": ("alarms",),
     "Structures": ("structures",),

@@ -1,7 +1,8 @@
 -- Findings on the lining, detected and drawn, of all kinds and states; leaks are the wet ones. A finding on a vertical wall has no
 -- area in plan, so there are three geometries, each with a view of its own for QGIS: unrolled (chainage,
 -- arc; SRID 0), on the map beside the axis, and in space. Findings are drawn and edited through finding_unrolled, finding_map and
--- finding_3d (findings/draw.sql). Needs stationing (geometry/stationing.sql) and make_geometry_views (views/geometry.sql).
+-- finding_3d (findings/draw.sql). Needs stationing (geometry/stationing.sql), line_orientation (findings/orientation.sql) and
+-- make_geometry_views (views/geometry.sql).
 
 -- Words for a reason: one text if it supports a leak, another if it does not. A reason without a text keeps its name.
 CREATE OR REPLACE FUNCTION tunnel_internal.evidence_words(reason text, log_odds float8) RETURNS text
@@ -81,7 +82,8 @@ SELECT a.id, a.survey_id, s.name AS survey, a.km,
        (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, m.chainage) l) AS label,
        a.arc_from, a.arc_to, a.clock,
        coalesce(a.kind_override, a.kind) AS kind, k.label AS kind_label, CASE WHEN NOT a.manual THEN a.kind END AS kind_detected, a.wet,
-       a.origin, a.manual, a.severity, v.label AS severity_label, a.width_mm, a.length, a.area,
+       a.origin, a.manual, a.severity, v.label AS severity_label, a.width_mm, a.length, o.orientation,
+       tunnel_api.orientation_class(o.orientation) AS orientation_class, a.area,
        a.image_share IS NOT NULL AS measured, a.darkening_mean, a.darkening_max, a.image_share, a.contrast, a.confidence, a.reasons,
        a.review, a.reviewed_by, a.reviewed_at, a.remark, a.drawn_by, a.drawn_at,
        a.detected, a.created_at, CASE WHEN NOT a.manual THEN a.detected_at END AS detected_at,
@@ -115,7 +117,8 @@ SELECT a.id, a.survey_id, s.name AS survey, a.km,
   LEFT JOIN tunnel.finding_kind k ON k.code = coalesce(a.kind_override, a.kind)
   LEFT JOIN tunnel.severity v ON v.id = a.severity
  CROSS JOIN LATERAL (SELECT (a.chainage_from + a.chainage_to) / 2 AS chainage,
-                            floor((a.chainage_from + a.chainage_to) / 2 / t.spacing)::integer AS near) m;
+                            floor((a.chainage_from + a.chainage_to) / 2 / t.spacing)::integer AS near) m
+ CROSS JOIN LATERAL (SELECT CASE WHEN a.length IS NOT NULL THEN tunnel_api.line_orientation(a.shape) END AS orientation) o;
 COMMENT ON VIEW tunnel_api.finding IS
     'Findings on the lining, detected and drawn, of all kinds and states, with three geometries: polygons, lines and points. review, remark and kind can be updated; draw and edit outlines in finding_unrolled, finding_map and finding_3d';
 
@@ -146,6 +149,8 @@ BEGIN
         ('severity_label', 'Name of the severity'),
         ('width_mm', 'Width of a line, such as a crack, mm'),
         ('length', 'Length of a line on the surface, m'),
+        ('orientation', 'Angle of a line to the axis in the unrolled plane, degrees: 0 along the tunnel, 90 around it'),
+        ('orientation_class', 'longitudinal (less than 30°), oblique (30° to 60°) or transverse (more than 60°)'),
         ('area', 'Area on the lining, m²; for a line, length × width; for a point, 0'),
         ('measured', 'True if it was measured on the image; the next detect measures drawn and redrawn findings'),
         ('darkening_mean', 'Mean darkening, dB: how much lower than dry lining the corrected intensity is'),

@@ -537,6 +537,7 @@ def example_catalogue() -> frozenset[str]:
     package = Path(findings.__file__).parent
     texts = set(CHAPTERS.values()) | set(findings.STATE_WORDS.values()) | {"detected", "redrawn", "split", "merged"}
     texts |= {LEAKS, OTHERS, DARK, *STATES, *URGENCIES, *actions.FOLLOW_UP.values(), "same"}
+    texts |= {"longitudinal", "transverse", "oblique"}
     texts |= set(GAP_STATES) | {"Not searched for leaks: {stretches}", "Searched, with gaps: {stretches}"}
     texts |= set(CHANGE_WORDS.values()) | {"Chainage", "Station", "o’clock", "m²", "Client", "Project"}
     texts |= {"Prepared by", "Checked by", "Accepted by", "Name", "Position", "Date", "Signature"}

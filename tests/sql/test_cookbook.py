@@ -513,6 +513,13 @@ def cracks(rows: Rows, a: Asked) -> None:
     assert [float(row["length_m"]) for row in rows] == pytest.approx([4.0, 3.0], rel=0.01)
 
 
+def densest(rows: Rows, a: Asked) -> None:
+    (row,) = rows  # all are between 12+350 and 12+400, along the tunnel
+    assert (row["name"], row["cracks"], float(row["width_mm"])) == ("block 2", 3, 2.0)
+    close(row, 0.01, length_m=7.5, longitudinal_m=7.5, density=7.5 / (50 * GIRTH))
+    close(row, transverse_m=0)
+
+
 def without_photo(rows: Rows, a: Asked) -> None:
     assert ids(rows) == [a.drawn["short crack"], a.drawn["longer crack"], a.drawn["bolt"]]
 
@@ -858,6 +865,7 @@ CHECKS: dict[str, Callable[[Rows, Asked], None]] = {
     "What is the progress of the review in each survey of all tunnels?": review_of_all,
     "How many findings of each kind and origin are there?": kinds,
     "Which cracks are longer than a metre, the most severe first?": cracks,
+    "In which blocks are the cracks densest, and how do they run?": densest,
     "Which severe findings have no photo?": without_photo,
     "Who drew what, and when?": drawers,
     "Which findings are not counted, and why?": not_counted,

@@ -17,7 +17,7 @@ from tunneldb.errors import UserError
 
 @click.group(cls=CommandGroup)
 def elements() -> None:
-    """Add, list or remove the elements of a tunnel: rings, blocks, stretches or zones, which a scheme rates."""
+    """Add, list or remove the elements of a tunnel: rings, blocks, stretches or zones; show cracks by element."""
 
 
 @elements.command(
@@ -97,6 +97,48 @@ def list_(settings: Settings, tunnel: str) -> None:
         ],
         right=(2, 3, 4),
     )
+
+
+@elements.command(examples=["tunneldb elements cracks ringo-2024 blocks"])
+@click.argument("survey")
+@click.argument("name")
+@click.pass_obj
+def cracks(settings: Settings, survey: str, name: str) -> None:
+    """Show the density of cracks of SURVEY in each element of the division NAME.
+
+    The density is the length of the counted cracks by the area of the lining, m/m². Lengths are also stated for
+    longitudinal (less than 30° to the axis), oblique and transverse cracks (more than 60°). 0 means that no crack was
+    drawn or imported there: whether anybody looked for cracks is not recorded.
+    """
+    from tunneldb.store.crack_density import read_crack_density
+    from tunneldb.store.survey import get_survey
+
+    with connect(settings.dsn) as conn:
+        rows = read_crack_density(conn, get_survey(conn, survey), name)
+    add_to_json(survey=survey, name=name, elements=rows)
+    header = [
+        "element",
+        "from",
+        "to",
+        "lining m²",
+        "cracks",
+        "length m",
+        "m/m²",
+        "longitudinal m",
+        "oblique m",
+        "transverse m",
+        "widest mm",
+    ]
+    cells = [
+        [
+            row["name"], row["label_from"], row["label_to"], f"{row['lining_area']:.1f}", row["cracks"],
+            f"{row['crack_length']:.2f}", None if row["density"] is None else f"{row['density']:.3f}",
+            f"{row['longitudinal_length']:.2f}", f"{row['oblique_length']:.2f}", f"{row['transverse_length']:.2f}",
+            None if row["width_mm"] is None else f"{row['width_mm']:.2f}",
+        ]
+        for row in rows
+    ]  # fmt: skip
+    print_table(header, cells, right=range(1, 11))
 
 
 @elements.command(examples=["tunneldb elements remove ringo blocks"])

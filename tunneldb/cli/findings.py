@@ -11,6 +11,7 @@ import click
 import psycopg
 
 from tunneldb.cli.coverage import say_coverage, say_remarks
+from tunneldb.cli.findings_trace import trace
 from tunneldb.cli.leaks import parse_clock
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import DefaultGroup, add_to_json, notify, printable, records
@@ -39,7 +40,10 @@ from tunneldb.store.survey import Survey, get_survey
 
 @click.group(cls=DefaultGroup)
 def findings() -> None:
-    """List, export, import or undo findings of all kinds, detected or drawn."""
+    """List, export, import, trace or undo findings of all kinds, detected or drawn."""
+
+
+findings.add_command(trace)
 
 
 @findings.command(
@@ -260,6 +264,7 @@ def _print_counts(conn: psycopg.Connection, survey: Survey, kinds: Sequence[str]
     examples=[
         "tunneldb findings import ringo-2024 defects.gpkg --map Riss=crack --map Abplatzung=spall --column kind=Art",
         "tunneldb findings import ringo-2024 drips.csv --column chainage=Station --column arc=Offset",
+        "tunneldb findings import ringo-2024 cracks.dxf --kind crack --layer RISSE",
     ],
 )
 @click.argument("survey")
@@ -270,16 +275,24 @@ def _print_counts(conn: psycopg.Connection, survey: Survey, kinds: Sequence[str]
 @click.option(
     "--column", "columns", multiple=True, metavar="OURS=THEIRS", help="Column of tunneldb and column in FILE; may be repeated."
 )
-@click.option("--layer", metavar="NAME", help="Layer of a GeoPackage; default: its only one.")
+@click.option("--layer", metavar="NAME", help="Layer of a GeoPackage; default: its only one. Layer of a DXF; default: all.")
+@click.option("--kind", metavar="KIND", help="Kind of the rows without one, such as crack.")
 @click.pass_obj
 def import_(
-    settings: Settings, survey: str, file: Path, kinds: tuple[str, ...], columns: tuple[str, ...], layer: str | None
+    settings: Settings,
+    survey: str,
+    file: Path,
+    kinds: tuple[str, ...],
+    columns: tuple[str, ...],
+    layer: str | None,
+    kind: str | None,
 ) -> None:
     """Import findings of another system from FILE into SURVEY, all or none.
 
     FILE is CSV, GeoPackage or GeoJSON with a kind for each finding, and optionally severity (1 to 4), width_mm
-    (millimetres), review, remark and photo (path or URL). Geometries of a layer without a coordinate system are in
-    chainage and arc, m; in the tunnel's they must be 3D, on the lining. A CSV has places by wkt or geometry (WKT:
+    (millimetres), review, remark and photo (path or URL); or the lines of a DXF. Geometries of a layer without a
+    coordinate system are in chainage and arc, m; in the tunnel's they must be 3D, on the lining. Lines of a DXF are
+    in chainage and arc, or in the tunnel's system if they have heights. A CSV has places by wkt or geometry (WKT:
     chainage and arc, or 3D), by chainage_from, chainage_to, arc_from and arc_to, by chainage and arc, or by x, y and
     z; a chainage may be a station, as 12+345.678. Each wrong row is listed; then nothing is imported.
     """
@@ -287,10 +300,12 @@ def import_(
 
     theirs, ours = _pairs(kinds, "--map"), _pairs(columns, "--column")
     with connect(settings.dsn) as conn:
-        done = import_findings(conn, get_survey(conn, survey), file, theirs, ours, layer)
+        done = import_findings(conn, get_survey(conn, survey), file, theirs, ours, layer, kind)
+    for note in done.notes:
+        notify(f"Note: {note}")
     for line in done.wrong:
         notify(printable(line))
-    add_to_json(survey=survey, imported=len(done.ids), kinds=dict(done.kinds), ids=done.ids, wrong=done.wrong)
+    add_to_json(survey=survey, imported=len(done.ids), kinds=dict(done.kinds), ids=done.ids, wrong=done.wrong, notes=done.notes)
     if done.wrong:
         raise UserError(f"{file}: {counted(len(done.wrong), 'wrong row')}, so nothing was imported")
     said = ", ".join(f"{number} {kind}" for kind, number in sorted(done.kinds.items()))

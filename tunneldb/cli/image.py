@@ -133,7 +133,8 @@ def import_(
     same name is replaced. Refused are mirrored images, images outside the survey, and images whose seam is at
     another side of the section. An image that exceeds the survey or is distorted gets a warning.
     """
-    from tunneldb.pipeline.import_image import ImportSettings, import_image
+    from tunneldb.pipeline.image_placement import ImportSettings
+    from tunneldb.pipeline.import_image import import_image
 
     name = kind if name is None else name
     if not _NAME.fullmatch(name):

@@ -6,71 +6,55 @@ import math
 import textwrap
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import psycopg
-import pyogrio
-import pyogrio.raw
 import shapely
 from psycopg import sql
-from pyogrio.errors import DataLayerError, DataSourceError
-from pyproj import CRS
 from shapely.geometry.base import BaseGeometry
 
 from tunneldb.csvfile import find_column, read_header, read_texts, row_lines
 from tunneldb.errors import UserError
-from tunneldb.files import gdal_fault, vector_source
-from tunneldb.geometry.crs import fits_srid, is_local, srid_name
 from tunneldb.numerals import parse_number
+from tunneldb.pipeline.finding_layers import (
+    COLUMNS,
+    DRAWINGS,
+    TABLES,
+    Row,
+    read_drawing,
+    read_layer,
+    require_unit,
+    require_within,
+)
 from tunneldb.store.alignment import station_chainages
 from tunneldb.store.coverage import GAP_STATES
 from tunneldb.store.remarks import REMARK
 from tunneldb.store.survey import Survey
 
-COLUMNS = ("kind", "severity", "width_mm", "review", "remark", "photo")
-"""Columns read from each row besides its place; all except the kind are optional."""
-
-
-_TEXT = (".csv", ".txt")
-_LAYERED = (".gpkg", ".geojson", ".json")
-"""Extensions of imported files: tables, and layers."""
-
-
-@dataclass(frozen=True)
-class Row:
-    """A row of a file.
-
-    Attributes
-    ----------
-    number : int
-        Its number: of a CSV the line, else the feature, from 1.
-    values : mapping of str to str
-        Its values, by our names; empty ones are left out.
-    shape : geometry or None
-        Its place.
-    view : {'unrolled', '3d'}
-        In which coordinates.
-    wrong : str
-        Why it has no shape, if it is known.
-    """
-
-    number: int
-    values: Mapping[str, str]
-    shape: BaseGeometry | None
-    view: str
-    wrong: str = ""
-
 
 @dataclass(frozen=True)
 class Imported:
-    """Result of an import: number of each kind and ids in order of the file; or the errors by row."""
+    """Result of an import.
+
+    Attributes
+    ----------
+    kinds : Counter of str
+        Number of each kind.
+    ids : list of int
+        In order of the file.
+    wrong : list of str
+        Errors by row; if there are any, nothing was imported.
+    notes : list of str
+        Remarks, such as parts of the file that were left out.
+    """
 
     kinds: Counter[str]
     ids: list[int]
     wrong: list[str]
+    notes: list[str] = field(default_factory=list)
 
 
 def import_findings(
@@ -80,8 +64,11 @@ def import_findings(
     kinds: Mapping[str, str],
     columns: Mapping[str, str],
     layer: str | None = None,
+    kind: str | None = None,
 ) -> Imported:
-    """Import findings from a CSV, GeoPackage or GeoJSON file in one transaction; none if any row is wrong.
+    """Import findings from a CSV, GeoPackage, GeoJSON or DXF file in one transaction; none if any row is wrong.
+
+    Each part of a multi-part line is a finding, after parts that meet end to end were joined.
 
     Parameters
     ----------
@@ -97,25 +84,36 @@ def import_findings(
     columns : mapping
         Their column by ours.
     layer : str, optional
-        Layer of a GeoPackage; by default its only one.
+        Layer of a GeoPackage, by default its only one; or of a DXF, by default all.
+    kind : str, optional
+        Kind of the rows without one.
 
     Raises
     ------
     UserError
         If the file cannot be read, or lacks a column.
     """
-    rows = _read_csv(conn, survey, path, columns) if path.suffix.lower() in _TEXT else _read_layer(path, survey, columns, layer)
-    ids, wrong = [], []
+    ids: list[int] = []
+    wrong: list[str] = []
+    notes: list[str] = []
+    needed = ("kind",) if kind is None else ()
+    if path.suffix.lower() in TABLES:
+        rows = _read_csv(conn, survey, path, columns, needed)
+    elif path.suffix.lower() in DRAWINGS:
+        rows = require_within(conn, survey, path, read_drawing(path, columns, layer, needed, notes))
+    else:
+        rows = require_within(conn, survey, path, read_layer(path, survey, columns, layer, needed))
     made: Counter[str] = Counter()
     for row in rows:
         theirs = row.values.get("kind", "")
         if row.shape is None and theirs in (*GAP_STATES, REMARK):  # a list of findings begins with such rows
             continue
-        kind = kinds.get(theirs, theirs)
+        ours = kinds.get(theirs, theirs) or kind or ""
+        parts = _parts(row.shape)
         try:
             with conn.transaction():
-                ids.append(_insert(conn, survey, row, kind))
-            made[kind] += 1
+                ids += [insert_finding(conn, survey, replace(row, shape=part), ours) for part in parts]
+            made[ours] += len(parts)
         except ValueError as error:
             wrong.append(f"{path}, row {row.number}: {error}")
         except psycopg.Error as error:
@@ -124,10 +122,24 @@ def import_findings(
         conn.rollback()
         return Imported(Counter(), [], wrong)
     conn.commit()
-    return Imported(made, ids, [])
+    return Imported(made, ids, [], notes)
 
 
-def _insert(conn: psycopg.Connection[Any], survey: Survey, row: Row, kind: str) -> int:
+def _parts(shape: BaseGeometry | None) -> list[BaseGeometry | None]:
+    """Return the lines of a multi-part line, those that meet end to end joined; else the shape itself."""
+    if isinstance(shape, shapely.MultiLineString) and len(shape.geoms) > 1:
+        return list(shapely.get_parts(shapely.line_merge(shape)))
+    return [shape]
+
+
+def insert_finding(conn: psycopg.Connection[Any], survey: Survey, row: Row, kind: str) -> int:
+    """Insert a finding, and return its id.
+
+    Raises
+    ------
+    ValueError, psycopg.Error
+        If it is wrong; the message is for the person who imports it.
+    """
     if row.shape is None:
         raise ValueError(row.wrong or "it has no geometry; draw it, or delete the row")
     query = sql.SQL(
@@ -166,7 +178,9 @@ def _number(row: Row, name: str, kind: type[int] | type[float]) -> float | None:
     return kind(value)
 
 
-def _read_csv(conn: psycopg.Connection[Any], survey: Survey, path: Path, columns: Mapping[str, str]) -> Iterator[Row]:
+def _read_csv(
+    conn: psycopg.Connection[Any], survey: Survey, path: Path, columns: Mapping[str, str], needed: Sequence[str]
+) -> Iterator[Row]:
     header = read_header(path)
 
     def column(name: str) -> list[str] | None:
@@ -177,10 +191,13 @@ def _read_csv(conn: psycopg.Connection[Any], survey: Survey, path: Path, columns
             return None
         return read_texts(path, theirs)
 
-    _require_unit(path, header, columns)
+    require_unit(path, header, columns)
     texts = {name: found for name in (*COLUMNS, *_PLACES) if (found := column(name)) is not None}
-    if "kind" not in texts:
-        raise UserError(f"{path} has no column kind: say which by --column kind=THEIRS; its header is {','.join(header)!r}")
+    if "kind" in needed and "kind" not in texts:
+        raise UserError(
+            f"{path} has no column kind: say which by --column kind=THEIRS; its header is {','.join(header)!r}; or say the kind"
+            " of all by --kind"
+        )
     ways = [way for way in _WAYS if all(name in texts for name in way)]
     if not ways:
         raise UserError(
@@ -188,7 +205,7 @@ def _read_csv(conn: psycopg.Connection[Any], survey: Survey, path: Path, columns
             f" arc_from and arc_to; chainage and arc; or x, y and z (--column OURS=THEIRS); its header is {','.join(header)!r}"
         )
     lines = row_lines(path)
-    for k in range(len(texts["kind"])):
+    for k in range(len(lines)):
         values = {name: found[k] for name, found in texts.items() if found[k]}
         yield _row(conn, survey, lines[k], values, next((way for way in ways if all(name in values for name in way)), None))
 
@@ -268,55 +285,3 @@ def read_chainage(conn: psycopg.Connection[Any], survey: Survey, name: str, text
         where = " and ".join(f"{chainage:.3f}" for chainage in chainages)
         raise ValueError(f"{name} is {text}: tunnel {survey.tunnel} has that station at chainages {where} m; give one of these")
     return chainages[0]
-
-
-def _read_layer(path: Path, survey: Survey, columns: Mapping[str, str], layer: str | None) -> Iterator[Row]:
-    if path.suffix.lower() not in _LAYERED:
-        raise UserError(f"{path}: findings are imported from {', '.join((*_TEXT, *_LAYERED))}; save a workbook as CSV")
-    if not path.is_file():
-        raise UserError(f"{path}: no such file")
-    source = vector_source(path)
-    try:
-        there = [name for name, geometry in pyogrio.list_layers(source).tolist() if geometry is not None]
-        if layer is None and len(there) > 1:
-            raise UserError(f"{path} has {len(there)} layers: say which by --layer: {', '.join(there)}")
-        if layer is None and there:
-            layer = there[0]
-        meta, _, shapes, found = pyogrio.raw.read(source, layer=layer)
-    except (DataSourceError, DataLayerError, RuntimeError, ValueError) as error:
-        raise UserError(f"{path}: cannot be read: {gdal_fault(error)}") from None
-    view = _view(path, meta["crs"], survey)
-    names = list(meta["fields"])
-    wanted = {ours: columns.get(ours, ours) for ours in COLUMNS}
-    if missing := [theirs for ours, theirs in wanted.items() if theirs not in names and (ours == "kind" or ours in columns)]:
-        raise UserError(
-            f"{path} has no column {', '.join(missing)}: it has {', '.join(names)}; say which by --column OURS=THEIRS"
-        )
-    _require_unit(path, names, columns)
-    held = {ours: found[names.index(theirs)] for ours, theirs in wanted.items() if theirs in names}
-    for k, data in enumerate([] if shapes is None else shapes):
-        values = {ours: str(column[k]) for ours, column in held.items() if not _empty(column[k])}
-        yield Row(k + 1, values, None if data is None else shapely.from_wkb(data, on_invalid="ignore"), view)
-
-
-def _require_unit(path: Path, names: Sequence[str], columns: Mapping[str, str]) -> None:
-    """Raise UserError if a file has a width without a unit, and none is named for ``width_mm``."""
-    if "width" in names and "width_mm" not in names and "width_mm" not in columns:
-        raise UserError(f"{path} has a column width without a unit: if it is in millimetres, add --column width_mm=width")
-
-
-def _empty(value: Any) -> bool:
-    return value is None or value == "" or (isinstance(value, float) and math.isnan(value)) or value != value
-
-
-def _view(path: Path, given: str | None, survey: Survey) -> str:
-    """Return the coordinates of a layer: the unrolled plane, which has no system, or the tunnel's."""
-    crs = None if given is None else CRS(given)
-    if crs is None or is_local(crs) or (path.suffix.lower() in (".geojson", ".json") and b'"crs"' not in path.read_bytes()):
-        return "unrolled"
-    if fits_srid(crs, survey.srid):
-        return "3d"
-    raise UserError(
-        f"{path} is in {crs.name}: findings are in the unrolled plane, without a coordinate system, or 3D"
-        f" in {srid_name(survey.srid)}"
-    )

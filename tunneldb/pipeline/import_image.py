@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -11,32 +11,23 @@ from typing import Any
 import numpy as np
 import psycopg
 
-from tunneldb.arrays import Float
-from tunneldb.counted import counted
 from tunneldb.errors import InputError
 from tunneldb.geometry.stationing import KILOMETRE
-from tunneldb.pipeline.image_files import Controls, ImageFile, open_image, own_controls, read_controls, read_frames
+from tunneldb.pipeline.image_files import ImageFile
+from tunneldb.pipeline.image_placement import ControlPoint, ImportSettings, place_image
 from tunneldb.pipeline.other_images import measure_under_findings
 from tunneldb.pipeline.pictures import find_pictures, project_kilometre
 from tunneldb.pointcloud.formats.e57 import is_e57
 from tunneldb.raster.geotiff import Raster
 from tunneldb.raster.grid import BLOCK, Grid
 from tunneldb.raster.overview import Overview
-from tunneldb.raster.placement.checks import Lining, Placed, check_extent, check_fit, check_placement, scale_error
-from tunneldb.raster.placement.control import ControlFit, fit_control
-from tunneldb.raster.placement.mapping import AffineMapping, pixel_sides
-from tunneldb.raster.placement.resample import PIXELS, Frame, resample, usual_pixel
+from tunneldb.raster.placement.checks import Lining, Placed
+from tunneldb.raster.placement.resample import PIXELS, resample, usual_pixel
 from tunneldb.store.imported_images import ImportedImage, insert_overview, insert_pixels, replace_imported, section_extent
 from tunneldb.store.survey import Survey
 
 UNITS = {"thermal": "°C", "photo": "", "radar": "", "moisture": "%", "other": ""}
 """Kinds of imported images, and the unit of one whose file states none."""
-
-TABLES = (".csv", ".txt")
-"""Extensions of tables of frames."""
-
-MAX_FRAME_STRETCH = 0.1
-"""Ratio of the sides of a frame's pixels, minus 1, from which there is a warning."""
 
 MAX_BLOCK = 10**8
 """Maximum number of pixels of a block."""
@@ -45,49 +36,6 @@ MAX_STEPS = 32000
 """Number of steps from 0 to the greatest value that are stored."""
 
 _Progress = Callable[[str, float | None], Callable[[float], None]]
-
-
-@dataclass(frozen=True)
-class ImportSettings:
-    """How an image is imported.
-
-    Attributes
-    ----------
-    name, kind : str
-    points : Path, optional
-        File of control points.
-    pixel : float, optional
-        Side of a pixel, m.
-    unit : str, optional
-        In place of the unit that the file states.
-    band : int, optional
-        Band of the file.
-    scale, offset : float, optional
-        Value of a stored number n: scale n + offset.
-    """
-
-    name: str
-    kind: str
-    points: Path | None = None
-    pixel: float | None = None
-    unit: str | None = None
-    band: int | None = None
-    scale: float | None = None
-    offset: float | None = None
-
-
-@dataclass(frozen=True)
-class ControlPoint:
-    """Control point with its residual, given minus fitted place, m."""
-
-    name: str
-    column: float
-    row: float
-    chainage: float
-    arc: float
-    chainage_residual: float
-    arc_residual: float
-    used: bool
 
 
 @dataclass(frozen=True)
@@ -136,18 +84,6 @@ class _Prepared:
     notes: list[str]
 
 
-@dataclass
-class _Placement:
-    """Frames of an image with their extent, and the control points, if there are any."""
-
-    frames: list[Frame]
-    placed: Placed
-    way: str
-    fit: ControlFit | None = None
-    points: list[ControlPoint] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-
-
 def import_image(
     conn: psycopg.Connection[Any],
     survey: Survey,
@@ -187,7 +123,7 @@ def _prepare_frames(
     conn: psycopg.Connection[Any], survey: Survey, path: Path, settings: ImportSettings, lining: Lining, progress: _Progress
 ) -> _Prepared:
     """Place images that show the unrolled lining, and describe the one that is to be stored."""
-    done = _place(conn, survey, path, settings, lining)
+    done = place_image(conn, survey, path, settings, lining)
     sources = [frame.source for frame in done.frames]
     low, high = _value_range(path, sources, progress)
     first = sources[0]
@@ -333,82 +269,3 @@ def _checked_pixel(pixel: float, given: bool, placed: Placed, lining: Lining) ->
         least = next(side for side in PIXELS if fits(side))
         raise InputError(f"--pixel {pixel:g}: it must be at least {least:g} for an image {width:.1f} m wide")
     return pixel
-
-
-def _place(conn: psycopg.Connection[Any], survey: Survey, path: Path, settings: ImportSettings, lining: Lining) -> _Placement:
-    if path.suffix.lower() in TABLES:
-        if settings.points is not None:
-            raise InputError(f"{path} is a table of frames, which states places itself: leave out --points")
-        frames = read_frames(conn, survey, path, settings.band, settings.scale, settings.offset)
-        return _Placement(frames, _union(frames, lining), "frames")
-    image = open_image(path, settings.band, settings.scale, settings.offset)
-    if settings.points is not None or (image.transform is None and image.ground):
-        controls = own_controls(image) if settings.points is None else read_controls(conn, survey, settings.points, image)
-        return _by_points(settings.points or path, image, controls, lining)
-    if image.transform is None:
-        raise InputError(
-            f"{path} has no coordinates: give control points with column, row, chainage and arc (--points FILE), a world file,"
-            " or a table of frames"
-        )
-    mapping = AffineMapping(image.transform)
-    try:
-        placed = check_placement(mapping, image.columns, image.rows, lining)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
-    return _Placement([Frame(image, mapping)], placed, "coordinates")
-
-
-def _union(frames: Sequence[Frame], lining: Lining) -> Placed:
-    """Return the extent of frames together, with warnings."""
-    each = []
-    for frame in frames:
-        linear, source = frame.mapping.linear, frame.source
-        x = (linear.c, linear.c + linear.a * source.columns)
-        y = (linear.f, linear.f + linear.e * source.rows)
-        each.append((min(x), max(x), min(y), max(y)))
-    west, east, low, high = np.array(each).T
-    placed = Placed(float(west.min()), float(east.max()), float(low.min()), float(high.max()))
-    check_extent(placed, lining)
-    outside = (east <= lining.chainage_from) | (west >= lining.chainage_to) | (high <= lining.arc_from) | (low >= lining.arc_to)
-    if outside.any():
-        placed.warnings.append(f"{counted(int(outside.sum()), 'frame')} of {len(frames)} outside the survey's lining")
-    ratios = [max(sides) / min(sides) - 1.0 for sides in (pixel_sides(frame.mapping) for frame in frames)]
-    if max(ratios) > MAX_FRAME_STRETCH:
-        placed.warnings.append(
-            f"pixels of a frame differ by up to {100 * max(ratios):.0f} % along and around the tunnel: check chainages and arcs"
-        )
-    return placed
-
-
-def _by_points(path: Path, image: ImageFile, controls: Controls, lining: Lining) -> _Placement:
-    try:
-        fit = fit_control(controls.pixels, controls.places)
-        warnings = check_fit(fit)
-        placed = check_placement(fit.mapping, image.columns, image.rows, lining)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
-    points = [
-        _control_point(name, controls.pixels[k], controls.places[k], fit.residuals[k], bool(fit.outliers[k]))
-        for k, name in enumerate(controls.names)
-    ]
-    notes = [
-        f"control point {point.name} is not used: it deviates by {point.chainage_residual:+.3f} m along and"
-        f" {point.arc_residual:+.3f} m around the tunnel"
-        for point in points
-        if not point.used
-    ]
-    if image.transform is not None:
-        scale, along, around = scale_error(AffineMapping(image.transform), fit.mapping, image.columns, image.rows)
-        if np.isfinite([scale, along, around]).all() and abs(scale) < 0.5 and max(abs(along), abs(around)) < 100.0:
-            length = "long" if scale > 0 else "short"
-            notes.append(
-                f"by its own coordinates the image is {abs(100 * scale):.2f} % too {length}, and its start is off by"
-                f" {along:+.3f} m along and {around:+.3f} m around the tunnel"
-            )
-    placed.warnings.extend(warnings)
-    return _Placement([Frame(image, fit.mapping)], placed, "points", fit, points, notes)
-
-
-def _control_point(name: str, pixel: Float, place: Float, residual: Float, outlier: bool) -> ControlPoint:
-    (column, row), (chainage, arc), (along, around) = (each.tolist() for each in (pixel, place, residual))
-    return ControlPoint(name, column, row, chainage, arc, along, around, not outlier)

@@ -27,7 +27,8 @@ COUNTED: tuple[State, ...] = ("open", "confirmed")
 class Finding:
     """A finding; the attributes are the columns of the view ``finding``, which describes them.
 
-    Lengths are in m, areas in m², darkening in dB, clock positions in hours, shares and confidence from 0 to 1.
+    Lengths are in m, areas in m², darkening in dB, clock positions in hours, orientations in degrees, shares and
+    confidence from 0 to 1.
 
     Attributes
     ----------
@@ -57,6 +58,8 @@ class Finding:
     area: float
     length: float | None
     width_mm: float | None
+    orientation: float | None
+    orientation_class: str | None
     darkening_mean: float | None
     darkening_max: float | None
     contrast: float | None

@@ -165,4 +165,9 @@ def _images(folder: Path) -> None:
         folder / "image-points.csv",
         "column,row,chainage,arc\n" + "\n".join(f"{c},{r},{12320 + 0.1 * c:.3f},{3 - 0.1 * r:.3f}" for c, r in points),
     )
+    cracks = np.zeros((60, 200), np.uint8)
+    cracks[30:32, 20:180] = 255
+    with rasterio.open(folder / "mask.png", "w", driver="PNG", width=200, height=60, count=1, dtype="uint8") as image:
+        image.write(cracks[None])
+    (folder / "mask-points.csv").write_bytes((folder / "image-points.csv").read_bytes())
     _write(folder / "frames.csv", f"file,chainage_from,chainage_to,arc_from,arc_to\n{folder / 'strip.tif'},12320,12340,-3,3\n")

@@ -21,7 +21,8 @@ _ALIASES = {
     "arc_to": "Arc to (m)", "clock": "Clock position (h)", "kind": "Kind", "kind_label": "Kind (name)",
     "kind_detected": "Found as",
     "wet": "Wet", "origin": "Origin of the outline", "manual": "Drawn by hand", "severity": "Severity",
-    "severity_label": "Severity (name)", "width_mm": "Width of the line (mm)", "length": "Length (m)", "area": "Area (m²)",
+    "severity_label": "Severity (name)", "width_mm": "Width of the line (mm)", "length": "Length (m)",
+    "orientation": "Angle to the axis (°)", "orientation_class": "Direction", "area": "Area (m²)",
     "measured": "Measured on the image", "darkening_mean": "Mean darkening (dB)", "darkening_max": "Greatest darkening (dB)",
     "image_share": "Share measured", "contrast": "Contrast (sigma)", "confidence": "Confidence (0-1)", "reasons": "Reasons",
     "review": "Review", "reviewed_by": "Reviewed by", "reviewed_at": "Reviewed at", "remark": "Remark", "drawn_by": "Drawn by",
@@ -38,8 +39,9 @@ _PHOTO_ALIASES = {
     "caption": "Caption", "added_by": "Added by", "added_at": "Added at",
 }  # fmt: skip
 _DECIMALS = {
-    "chainage_from": 3, "chainage_to": 3, "arc_from": 2, "arc_to": 2, "clock": 1, "length": 2, "area": 3, "darkening_mean": 1,
-    "darkening_max": 1, "image_share": 2, "contrast": 1, "confidence": 2, "other_contrast": 1, "easting": 2, "northing": 2,
+    "chainage_from": 3, "chainage_to": 3, "arc_from": 2, "arc_to": 2, "clock": 1, "length": 2, "orientation": 1, "area": 3,
+    "darkening_mean": 1, "darkening_max": 1, "image_share": 2, "contrast": 1, "confidence": 2, "other_contrast": 1,
+    "easting": 2, "northing": 2,
     "height": 2,
 }  # fmt: skip
 _MOMENTS = ("reviewed_at", "drawn_at", "created_at", "detected_at", "added_at")
@@ -48,7 +50,8 @@ _SAVED = '"label" IS NOT NULL'
 
 _REVIEWS = {"Open": "open", "Confirmed": "confirmed", "Rejected": "rejected"}
 _FACTS = (
-    "id", "label", CLOCK_TEXT, "state", "area", "length", "origin", "drawn_by", "drawn_at", "reviewed_by", "reviewed_at",
+    "id", "label", CLOCK_TEXT, "state", "area", "length", "orientation", "orientation_class", "origin",
+    "drawn_by", "drawn_at", "reviewed_by", "reviewed_at",
     "measured",
     "darkening_mean", "darkening_max", "image_share", "other_images", "other_contrast", "kind_detected", "confidence",
     "reasons", "also_detected", "merged",

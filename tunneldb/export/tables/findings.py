@@ -21,8 +21,9 @@ from tunneldb.store.remarks import Remark
 
 COLUMNS = (
     "id", "km", "label", "chainage_from", "chainage_to", "arc_from", "arc_to", "clock", "kind", "kind_label", "origin",
-    "severity", "severity_label", "area", "length", "width_mm", "darkening_mean", "confidence", "review", "state", "counted",
-    "also_detected", "merged_into", "same_as", "parent_id", "dry_region_id", "drawn_by", "drawn_at", "reviewed_by",
+    "severity", "severity_label", "area", "length", "width_mm", "orientation", "orientation_class", "darkening_mean",
+    "confidence", "review", "state", "counted", "also_detected", "merged_into", "same_as", "parent_id",
+    "dry_region_id", "drawn_by", "drawn_at", "reviewed_by",
     "reviewed_at", "remark", "photos", "easting", "northing", "height",
 )  # fmt: skip
 """Columns of the files: attributes of a finding."""

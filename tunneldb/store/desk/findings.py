@@ -53,7 +53,8 @@ def finding(conn: psycopg.Connection[Any], finding_id: int) -> dict[str, Any] | 
         rows = conn.execute(
             "SELECT f.id, f.survey, f.label, f.clock, f.chainage_from, f.chainage_to, f.arc_from, f.arc_to, f.kind,"
             " f.kind_label, f.kind_detected, f.origin, f.state, f.review, f.severity, f.width_mm, f.remark, f.area, f.length,"
-            " f.darkening_mean, f.darkening_max, f.contrast, f.confidence, f.other_images, f.reviewed_by,"
+            " f.orientation, f.orientation_class, f.darkening_mean, f.darkening_max, f.contrast, f.confidence, f.other_images,"
+            " f.reviewed_by,"
             " to_char(f.reviewed_at, 'YYYY-MM-DD HH24:MI') AS reviewed_at,"
             " f.drawn_by, public.ST_AsGeoJSON(f.unrolled, 4)::json AS outline FROM tunnel_api.finding f WHERE f.id = %s",
             [finding_id],

@@ -27,6 +27,7 @@ function valuesOf(finding, severities) {
     ['Detected as', finding.kind_detected ? `${finding.kind_detected}, confidence ${number(finding.confidence, 2)}` : null],
     ['Origin', finding.drawn_by ? `${finding.origin} by ${finding.drawn_by}` : finding.origin],
     ['Area', finding.area ? number(finding.area, 2, 'm²') : null], ['Length', finding.length ? number(finding.length, 2, 'm') : null],
+    ['Direction', finding.orientation_class ? `${finding.orientation_class}, ${number(finding.orientation, 0)}° to the axis` : null],
     ['Width', finding.width_mm !== null ? number(finding.width_mm, 1, 'mm') : null],
     ['Severity', finding.severity !== null && finding.severity !== undefined ? `${finding.severity}${severity ? `, ${severity}` : ''}` : null],
     ['Chainage', `${station(finding.chainage_from, 2)} to ${station(finding.chainage_to, 2)}`],

@@ -253,6 +253,20 @@
         </config>
       </editWidget>
     </field>
+    <field name="orientation" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="orientation_class" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
     <field name="area" configurationFlags="None">
       <editWidget type="Range">
         <config>
@@ -581,40 +595,42 @@
     <alias index="18" field="severity_label" name="Severity (name)"/>
     <alias index="19" field="width_mm" name="Width of the line (mm)"/>
     <alias index="20" field="length" name="Length (m)"/>
-    <alias index="21" field="area" name="Area (m²)"/>
-    <alias index="22" field="measured" name="Measured on the image"/>
-    <alias index="23" field="darkening_mean" name="Mean darkening (dB)"/>
-    <alias index="24" field="darkening_max" name="Greatest darkening (dB)"/>
-    <alias index="25" field="image_share" name="Share measured"/>
-    <alias index="26" field="contrast" name="Contrast (sigma)"/>
-    <alias index="27" field="confidence" name="Confidence (0-1)"/>
-    <alias index="28" field="reasons" name="Reasons"/>
-    <alias index="29" field="review" name="Review"/>
-    <alias index="30" field="reviewed_by" name="Reviewed by"/>
-    <alias index="31" field="reviewed_at" name="Reviewed at"/>
-    <alias index="32" field="remark" name="Remark"/>
-    <alias index="33" field="drawn_by" name="Drawn by"/>
-    <alias index="34" field="drawn_at" name="Drawn at"/>
-    <alias index="35" field="detected" name="Found by the last detection"/>
-    <alias index="36" field="created_at" name="First detected"/>
-    <alias index="37" field="detected_at" name="Last detected"/>
-    <alias index="38" field="also_detected" name="Also detected"/>
-    <alias index="39" field="detected_as" name="Detected as"/>
-    <alias index="40" field="parent_id" name="Split off"/>
-    <alias index="41" field="merged_into" name="Merged into"/>
-    <alias index="42" field="merged" name="Merged into this"/>
-    <alias index="43" field="same_as" name="Same as"/>
-    <alias index="44" field="dry_region_id" name="In dry region"/>
-    <alias index="45" field="counted" name="Included in totals"/>
-    <alias index="46" field="state" name="State"/>
-    <alias index="47" field="photos" name="Photos"/>
-    <alias index="48" field="evidence" name="Evidence for and against a leak"/>
-    <alias index="49" field="model" name="Classified by model"/>
-    <alias index="50" field="superseded" name="Superseded"/>
-    <alias index="51" field="clock_text" name="Clock position"/>
-    <alias index="52" field="easting" name="Easting (m)"/>
-    <alias index="53" field="northing" name="Northing (m)"/>
-    <alias index="54" field="height" name="Height (m)"/>
+    <alias index="21" field="orientation" name="Angle to the axis (°)"/>
+    <alias index="22" field="orientation_class" name="Direction"/>
+    <alias index="23" field="area" name="Area (m²)"/>
+    <alias index="24" field="measured" name="Measured on the image"/>
+    <alias index="25" field="darkening_mean" name="Mean darkening (dB)"/>
+    <alias index="26" field="darkening_max" name="Greatest darkening (dB)"/>
+    <alias index="27" field="image_share" name="Share measured"/>
+    <alias index="28" field="contrast" name="Contrast (sigma)"/>
+    <alias index="29" field="confidence" name="Confidence (0-1)"/>
+    <alias index="30" field="reasons" name="Reasons"/>
+    <alias index="31" field="review" name="Review"/>
+    <alias index="32" field="reviewed_by" name="Reviewed by"/>
+    <alias index="33" field="reviewed_at" name="Reviewed at"/>
+    <alias index="34" field="remark" name="Remark"/>
+    <alias index="35" field="drawn_by" name="Drawn by"/>
+    <alias index="36" field="drawn_at" name="Drawn at"/>
+    <alias index="37" field="detected" name="Found by the last detection"/>
+    <alias index="38" field="created_at" name="First detected"/>
+    <alias index="39" field="detected_at" name="Last detected"/>
+    <alias index="40" field="also_detected" name="Also detected"/>
+    <alias index="41" field="detected_as" name="Detected as"/>
+    <alias index="42" field="parent_id" name="Split off"/>
+    <alias index="43" field="merged_into" name="Merged into"/>
+    <alias index="44" field="merged" name="Merged into this"/>
+    <alias index="45" field="same_as" name="Same as"/>
+    <alias index="46" field="dry_region_id" name="In dry region"/>
+    <alias index="47" field="counted" name="Included in totals"/>
+    <alias index="48" field="state" name="State"/>
+    <alias index="49" field="photos" name="Photos"/>
+    <alias index="50" field="evidence" name="Evidence for and against a leak"/>
+    <alias index="51" field="model" name="Classified by model"/>
+    <alias index="52" field="superseded" name="Superseded"/>
+    <alias index="53" field="clock_text" name="Clock position"/>
+    <alias index="54" field="easting" name="Easting (m)"/>
+    <alias index="55" field="northing" name="Northing (m)"/>
+    <alias index="56" field="height" name="Height (m)"/>
   </aliases>
   <editable>
     <field name="id" editable="0"/>
@@ -638,6 +654,8 @@
     <field name="severity_label" editable="0"/>
     <field name="width_mm" editable="0"/>
     <field name="length" editable="0"/>
+    <field name="orientation" editable="0"/>
+    <field name="orientation_class" editable="0"/>
     <field name="area" editable="0"/>
     <field name="measured" editable="0"/>
     <field name="darkening_mean" editable="0"/>
