@@ -51,7 +51,7 @@ ORDERS: Dict[str, Tuple[str, Callable[[Finding], Tuple[float, ...]]]] = {
     "doubtful": ("Most doubtful first", lambda f: (abs(f.probability - 0.5), f.chainage_from)),
     "large": ("Largest first", lambda f: (-f.area, f.chainage_from)),
     "chainage": ("By chainage", lambda f: (f.chainage_from, f.arc_from)),
-    "images": ("Greatest contrast in other images first", lambda f: (-f.contrast_elsewhere, f.chainage_from)),
+    "images": ("Greatest contrast in photos and thermography first", lambda f: (-f.contrast_elsewhere, f.chainage_from)),
 }
 """Orders by name: title, and sort key."""
 

@@ -88,6 +88,7 @@ LEAK = (
     "id", "km", "chainage_from", "chainage_to", "label", "arc_from", "arc_to", "clock", "kind", "confidence", "reasons",
     "contrast", "area", "drop_mean", "drop_max", "image_share", "review", "reviewed_by", "reviewed_at", "detected", "counted",
     "geometry", "severity", "severity_label", "remark", "easting", "northing", "height",
+    "other_images", "other_contrast",
 )  # fmt: skip
 """Columns that programs rely on."""
 

@@ -3,7 +3,7 @@
 export const OPEN = 'open';
 export const ORDERS = [
   ['likely', 'Most probable leak first'], ['unlikely', 'Least probable leak first'], ['doubtful', 'Most doubtful first'],
-  ['large', 'Largest first'], ['chainage', 'By chainage'], ['images', 'Greatest contrast in other images first'],
+  ['large', 'Largest first'], ['chainage', 'By chainage'], ['images', 'Greatest contrast in photos and thermography first'],
 ];
 
 /** Time between two reviews that counts as a pause, ms. */
