@@ -301,3 +301,29 @@ def test_the_density_of_cracks_is_their_length_by_the_lining_of_each_element(
     )
     assert zones == pytest.approx(whole, rel=0.005)
     conn.rollback()
+
+
+def test_the_density_is_printed_and_an_unknown_division_is_one_line(example: str, tmp_path: Path) -> None:
+    path, options = write_cracks(tmp_path, "gpkg", space=False)
+    told("findings", "import", NAME, path, *options)
+    rows = {row["name"]: row for row in told("elements", "cracks", NAME, "blocks")["elements"]}
+    expected = sum(length_on_lining(line) for line in LINES if line.bounds[2] < 12350)
+    assert rows["block 1"]["crack_length"] == pytest.approx(expected, rel=0.002)
+    assert rows["block 1"]["density"] == pytest.approx(expected / (50 * GIRTH), rel=0.01)
+    printed = run("elements", "cracks", NAME, "blocks").stdout
+    assert f"{expected:.2f}" in printed
+    assert "tunneldb elements list demo" in refused("elements", "cracks", NAME, "ghost")
+
+
+def test_lists_and_the_report_state_the_orientation(example: str, tmp_path: Path) -> None:
+    path, options = write_cracks(tmp_path, "gpkg", space=False)
+    told("findings", "import", NAME, path, *options)
+    listed = told("findings", "list", NAME, "--kind", "crack")["findings"]
+    assert [row["orientation_class"] for row in listed] == CLASSES
+    for name in ("c.csv", "c.gpkg", "c.geojson", "c.xlsx"):
+        assert run("findings", "list", NAME, "--kind", "crack", "-o", tmp_path / name).exit_code in (0, 1)
+    assert "orientation,orientation_class" in (tmp_path / "c.csv").read_text()
+    assert run("report", NAME, "-o", tmp_path / "report.html").exit_code in (0, 1)
+    page = (tmp_path / "report.html").read_text("utf-8")
+    for said in ("longitudinal, 0°", "transverse, 90°", "oblique, 45°"):
+        assert said in page
