@@ -536,6 +536,20 @@
         </config>
       </editWidget>
     </field>
+    <field name="other_images" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="other_contrast" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
     <field name="easting" configurationFlags="None">
       <editWidget type="Range">
         <config>
@@ -627,10 +641,12 @@
     <alias index="50" field="evidence" name="Evidence for and against a leak"/>
     <alias index="51" field="model" name="Classified by model"/>
     <alias index="52" field="superseded" name="Superseded"/>
-    <alias index="53" field="clock_text" name="Clock position"/>
-    <alias index="54" field="easting" name="Easting (m)"/>
-    <alias index="55" field="northing" name="Northing (m)"/>
-    <alias index="56" field="height" name="Height (m)"/>
+    <alias index="53" field="other_images" name="In other images"/>
+    <alias index="54" field="other_contrast" name="Contrast there (sigma)"/>
+    <alias index="55" field="clock_text" name="Clock position"/>
+    <alias index="56" field="easting" name="Easting (m)"/>
+    <alias index="57" field="northing" name="Northing (m)"/>
+    <alias index="58" field="height" name="Height (m)"/>
   </aliases>
   <editable>
     <field name="id" editable="0"/>
@@ -686,6 +702,8 @@
     <field name="evidence" editable="0"/>
     <field name="model" editable="0"/>
     <field name="superseded" editable="0"/>
+    <field name="other_images" editable="0"/>
+    <field name="other_contrast" editable="0"/>
     <field name="easting" editable="0"/>
     <field name="northing" editable="0"/>
     <field name="height" editable="0"/>
@@ -693,35 +711,37 @@
   <editorlayout>tablayout</editorlayout>
   <attributeEditorForm>
     <attributeEditorContainer name="Review" columnCount="1" groupBox="1" showLabel="1" visibilityExpressionEnabled="0" visibilityExpression="">
-      <attributeEditorField name="review" index="29" showLabel="1"/>
+      <attributeEditorField name="review" index="31" showLabel="1"/>
       <attributeEditorField name="kind" index="11" showLabel="1"/>
-      <attributeEditorField name="remark" index="32" showLabel="1"/>
-      <attributeEditorField name="reviewed_by" index="30" showLabel="1"/>
-      <attributeEditorField name="reviewed_at" index="31" showLabel="1"/>
+      <attributeEditorField name="remark" index="34" showLabel="1"/>
+      <attributeEditorField name="reviewed_by" index="32" showLabel="1"/>
+      <attributeEditorField name="reviewed_at" index="33" showLabel="1"/>
     </attributeEditorContainer>
     <attributeEditorContainer name="Finding" columnCount="2" groupBox="1" showLabel="1" visibilityExpressionEnabled="0" visibilityExpression="">
       <attributeEditorField name="id" index="0" showLabel="1"/>
       <attributeEditorField name="label" index="7" showLabel="1"/>
       <attributeEditorField name="segment" index="4" showLabel="1"/>
-      <attributeEditorField name="clock_text" index="51" showLabel="1"/>
-      <attributeEditorField name="area" index="21" showLabel="1"/>
-      <attributeEditorField name="image_share" index="25" showLabel="1"/>
+      <attributeEditorField name="clock_text" index="55" showLabel="1"/>
+      <attributeEditorField name="area" index="23" showLabel="1"/>
+      <attributeEditorField name="image_share" index="27" showLabel="1"/>
       <attributeEditorField name="kind_detected" index="13" showLabel="1"/>
-      <attributeEditorField name="confidence" index="27" showLabel="1"/>
-      <attributeEditorField name="reasons" index="28" showLabel="1"/>
-      <attributeEditorField name="evidence" index="48" showLabel="1"/>
-      <attributeEditorField name="contrast" index="26" showLabel="1"/>
-      <attributeEditorField name="darkening_mean" index="23" showLabel="1"/>
-      <attributeEditorField name="darkening_max" index="24" showLabel="1"/>
+      <attributeEditorField name="confidence" index="29" showLabel="1"/>
+      <attributeEditorField name="other_images" index="53" showLabel="1"/>
+      <attributeEditorField name="other_contrast" index="54" showLabel="1"/>
+      <attributeEditorField name="reasons" index="30" showLabel="1"/>
+      <attributeEditorField name="evidence" index="50" showLabel="1"/>
+      <attributeEditorField name="contrast" index="28" showLabel="1"/>
+      <attributeEditorField name="darkening_mean" index="25" showLabel="1"/>
+      <attributeEditorField name="darkening_max" index="26" showLabel="1"/>
       <attributeEditorField name="chainage_from" index="5" showLabel="1"/>
       <attributeEditorField name="chainage_to" index="6" showLabel="1"/>
       <attributeEditorField name="arc_from" index="8" showLabel="1"/>
       <attributeEditorField name="arc_to" index="9" showLabel="1"/>
-      <attributeEditorField name="detected" index="35" showLabel="1"/>
-      <attributeEditorField name="created_at" index="36" showLabel="1"/>
-      <attributeEditorField name="detected_at" index="37" showLabel="1"/>
-      <attributeEditorField name="counted" index="45" showLabel="1"/>
-      <attributeEditorField name="model" index="49" showLabel="1"/>
+      <attributeEditorField name="detected" index="37" showLabel="1"/>
+      <attributeEditorField name="created_at" index="38" showLabel="1"/>
+      <attributeEditorField name="detected_at" index="39" showLabel="1"/>
+      <attributeEditorField name="counted" index="47" showLabel="1"/>
+      <attributeEditorField name="model" index="51" showLabel="1"/>
       <attributeEditorField name="origin" index="15" showLabel="1"/>
       <attributeEditorField name="survey" index="2" showLabel="1"/>
     </attributeEditorContainer>

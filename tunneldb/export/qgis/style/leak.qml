@@ -367,6 +367,20 @@
         </config>
       </editWidget>
     </field>
+    <field name="other_images" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="other_contrast" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
     <field name="detected" configurationFlags="None">
       <editWidget type="TextEdit">
         <config>
@@ -511,20 +525,22 @@
     <alias index="23" field="remark" name="Remark"/>
     <alias index="24" field="drawn_by" name="Drawn by"/>
     <alias index="25" field="drawn_at" name="Drawn at"/>
-    <alias index="26" field="detected" name="Found by the last detection"/>
-    <alias index="27" field="created_at" name="First detected"/>
-    <alias index="28" field="detected_at" name="Last detected"/>
-    <alias index="29" field="counted" name="Included in totals"/>
-    <alias index="30" field="evidence" name="Evidence for and against a leak"/>
-    <alias index="31" field="model" name="Classified by model"/>
-    <alias index="32" field="wet" name="Wet"/>
-    <alias index="33" field="origin" name="Origin of the outline"/>
-    <alias index="34" field="clock_text" name="Clock position"/>
-    <alias index="35" field="easting" name="Easting (m)"/>
-    <alias index="36" field="northing" name="Northing (m)"/>
-    <alias index="37" field="height" name="Height (m)"/>
-    <alias index="38" field="severity" name="Severity"/>
-    <alias index="39" field="severity_label" name="Severity (name)"/>
+    <alias index="26" field="other_images" name="In other images"/>
+    <alias index="27" field="other_contrast" name="Contrast there (sigma)"/>
+    <alias index="28" field="detected" name="Found by the last detection"/>
+    <alias index="29" field="created_at" name="First detected"/>
+    <alias index="30" field="detected_at" name="Last detected"/>
+    <alias index="31" field="counted" name="Included in totals"/>
+    <alias index="32" field="evidence" name="Evidence for and against a leak"/>
+    <alias index="33" field="model" name="Classified by model"/>
+    <alias index="34" field="wet" name="Wet"/>
+    <alias index="35" field="origin" name="Origin of the outline"/>
+    <alias index="36" field="clock_text" name="Clock position"/>
+    <alias index="37" field="easting" name="Easting (m)"/>
+    <alias index="38" field="northing" name="Northing (m)"/>
+    <alias index="39" field="height" name="Height (m)"/>
+    <alias index="40" field="severity" name="Severity"/>
+    <alias index="41" field="severity_label" name="Severity (name)"/>
   </aliases>
   <editable>
     <field name="id" editable="0"/>
@@ -553,6 +569,8 @@
     <field name="remark" editable="1"/>
     <field name="drawn_by" editable="0"/>
     <field name="drawn_at" editable="0"/>
+    <field name="other_images" editable="0"/>
+    <field name="other_contrast" editable="0"/>
     <field name="detected" editable="0"/>
     <field name="created_at" editable="0"/>
     <field name="detected_at" editable="0"/>
@@ -580,14 +598,16 @@
       <attributeEditorField name="id" index="0" showLabel="1"/>
       <attributeEditorField name="label" index="7" showLabel="1"/>
       <attributeEditorField name="segment" index="4" showLabel="1"/>
-      <attributeEditorField name="clock_text" index="34" showLabel="1"/>
+      <attributeEditorField name="clock_text" index="36" showLabel="1"/>
       <attributeEditorField name="area" index="16" showLabel="1"/>
       <attributeEditorField name="image_share" index="19" showLabel="1"/>
-      <attributeEditorField name="severity_label" index="39" showLabel="1"/>
+      <attributeEditorField name="severity_label" index="41" showLabel="1"/>
       <attributeEditorField name="kind_detected" index="12" showLabel="1"/>
       <attributeEditorField name="confidence" index="14" showLabel="1"/>
+      <attributeEditorField name="other_images" index="26" showLabel="1"/>
+      <attributeEditorField name="other_contrast" index="27" showLabel="1"/>
       <attributeEditorField name="reasons" index="13" showLabel="1"/>
-      <attributeEditorField name="evidence" index="30" showLabel="1"/>
+      <attributeEditorField name="evidence" index="32" showLabel="1"/>
       <attributeEditorField name="contrast" index="15" showLabel="1"/>
       <attributeEditorField name="darkening_mean" index="17" showLabel="1"/>
       <attributeEditorField name="darkening_max" index="18" showLabel="1"/>
@@ -595,17 +615,17 @@
       <attributeEditorField name="chainage_to" index="6" showLabel="1"/>
       <attributeEditorField name="arc_from" index="8" showLabel="1"/>
       <attributeEditorField name="arc_to" index="9" showLabel="1"/>
-      <attributeEditorField name="easting" index="35" showLabel="1"/>
-      <attributeEditorField name="northing" index="36" showLabel="1"/>
-      <attributeEditorField name="height" index="37" showLabel="1"/>
+      <attributeEditorField name="easting" index="37" showLabel="1"/>
+      <attributeEditorField name="northing" index="38" showLabel="1"/>
+      <attributeEditorField name="height" index="39" showLabel="1"/>
       <attributeEditorField name="drawn_by" index="24" showLabel="1"/>
       <attributeEditorField name="drawn_at" index="25" showLabel="1"/>
-      <attributeEditorField name="detected" index="26" showLabel="1"/>
-      <attributeEditorField name="created_at" index="27" showLabel="1"/>
-      <attributeEditorField name="detected_at" index="28" showLabel="1"/>
-      <attributeEditorField name="counted" index="29" showLabel="1"/>
-      <attributeEditorField name="model" index="31" showLabel="1"/>
-      <attributeEditorField name="origin" index="33" showLabel="1"/>
+      <attributeEditorField name="detected" index="28" showLabel="1"/>
+      <attributeEditorField name="created_at" index="29" showLabel="1"/>
+      <attributeEditorField name="detected_at" index="30" showLabel="1"/>
+      <attributeEditorField name="counted" index="31" showLabel="1"/>
+      <attributeEditorField name="model" index="33" showLabel="1"/>
+      <attributeEditorField name="origin" index="35" showLabel="1"/>
       <attributeEditorField name="survey" index="2" showLabel="1"/>
     </attributeEditorContainer>
   </attributeEditorForm>
