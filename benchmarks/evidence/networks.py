@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import onnxruntime
-
-from tunneldb.segmentation.network import Network
+from tunneldb.segmentation.network import Network, runtime
 
 
 class Networks:
@@ -30,5 +28,5 @@ class Networks:
 
 def without(path: Path) -> set[str]:
     """Return the families that the training of a network left out."""
-    session = onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
+    session = runtime().InferenceSession(str(path), providers=["CPUExecutionProvider"])
     return set(session.get_modelmeta().custom_metadata_map.get("without", "").split())

@@ -1,5 +1,9 @@
 """A segmentation network of known answers, run on pictures; and that of the program."""
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from support.toy_network import toy_network, wide_network
@@ -98,3 +102,13 @@ def test_a_network_that_gives_no_probabilities_is_refused():
 def test_a_network_has_the_version_of_its_metadata_or_its_file():
     assert Network.load(toy_network(version="owner 3"), "file").version == "owner 3"
     assert Network.load(toy_network(), "file").version == "file"
+
+
+def test_nothing_is_kept_or_sent(tmp_path):
+    """ONNX Runtime would keep usage data for Microsoft in the home folder and in TMPDIR."""
+    environment = {name: value for name, value in os.environ.items() if not name.startswith(("XDG_", "ORT_"))}
+    environment |= {"HOME": str(tmp_path), "TMPDIR": str(tmp_path)}
+    code = "from tunneldb.segmentation.network import standard_network; assert standard_network().session"
+    subprocess.run([sys.executable, "-c", code], env=environment, check=True)
+    kept = [str(path) for path in tmp_path.rglob("*") if path.is_file() and "numba" not in str(path).lower()]
+    assert kept == []

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -51,6 +52,14 @@ def standard_network() -> Network:
     return Network.load(files("tunneldb.segmentation").joinpath("water.onnx").read_bytes(), "water")
 
 
+def runtime() -> Any:
+    """Import ONNX Runtime without its telemetry: version 1.32 sends usage data, and keeps it in the user's folders."""
+    os.environ["ORT_DISABLE_TELEMETRY"] = "1"
+    import onnxruntime
+
+    return onnxruntime
+
+
 @dataclass(frozen=True)
 class Network:
     """A segmentation network.
@@ -82,8 +91,7 @@ class Network:
         ValueError
             If it cannot be read, or its input or output is not that of a segmentation network.
         """
-        import onnxruntime
-
+        onnxruntime = runtime()
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = options.inter_op_num_threads = 1
         options.enable_cpu_mem_arena = False  # memory is free again after each strip
