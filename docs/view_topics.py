@@ -16,7 +16,7 @@ TOPICS = {
     "Leaks and findings": ("finding", "learned", "network"),
     "How wet, and what was seen": ("coverage", "statistics", "waterproof", "coverage_gap", "dark_band", "detectability"),
     "Ground and objects": ("ground",),
-    "Images of other instruments": ("imported_image", "finding_image"),
+    "Images of other instruments": ("imported_image",),
     "Inspection sheets": ("sheet",),
     "Change between surveys": ("measures/change",),
     "Design profile": ("deviation", "deviation_layer", "thickness", "evenness"),

@@ -141,7 +141,7 @@ def _draw_camera(values: Single, nodes: _Nodes, k: int, camera: Camera, picture:
 def _draw(
     numbers: Float, own: Float, best: Int64, camera: int, step: int, picture: UInt8, first: int, values: Single
 ) -> None:  # pragma: no cover - compiled
-    """Draw rows of a block, of which the first is ``first``: linear between nodes, and between the pixels of the picture."""
+    """Draw rows of a block from ``first`` on: linear between nodes, and between the pixels of the picture."""
     last_row, last_column = picture.shape[0] - 1, picture.shape[1] - 1
     for i in range(values.shape[0]):
         node_row = (first + i) // step
