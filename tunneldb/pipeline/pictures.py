@@ -30,6 +30,9 @@ from tunneldb.store.survey import Survey
 FINEST = 0.005
 """Side of the pixels of an image by default, m, if the pictures show the lining finer."""
 
+MAX_OFFSET = 0.05
+"""Mean offset of a part of the lining (0.4 m) from the surface beyond which it shows cables or a niche, m."""
+
 HELD = 4
 """Number of pictures whose pixels are in memory at once."""
 
@@ -124,7 +127,10 @@ def project_kilometre(
 
 
 class _Offsets:
-    """Offset of the lining from the surface, from the overview of the image of a kilometre; 0 where nothing was measured."""
+    """Offset of the lining from the surface, from the overview of the image of a kilometre.
+
+    It is 0 where nothing was measured, and where things before the lining or niches were.
+    """
 
     def __init__(self, overview: Raster | None) -> None:
         self._overview = overview
@@ -136,7 +142,7 @@ class _Offsets:
         place = self._overview.transform
         columns, rows = (chainages - place.c) / place.a - 0.5, (arcs - place.f) / place.e - 0.5
         at = np.stack(np.meshgrid(rows, columns, indexing="ij"))
-        values = np.nan_to_num(self._overview.values, nan=0.0)
+        values = np.where(np.abs(self._overview.values) <= MAX_OFFSET, self._overview.values, np.float32(0.0))
         return np.asarray(ndimage.map_coordinates(values, at, np.float32, order=1, mode="nearest"))
 
 

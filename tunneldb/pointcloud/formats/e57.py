@@ -365,7 +365,9 @@ def scans_of(path: Path, image: Any) -> list[Scan]:
     root = image.root()
     nodes = root["data3D"] if root.isDefined("data3D") else []
     if len(nodes) == 0:
-        raise InputError(f"{path}: the file holds no scan")
+        pictures = len(root["images2D"]) if root.isDefined("images2D") else 0
+        only = f", only pictures ({pictures}): tunneldb image import places those that have a pose" if pictures else ""
+        raise InputError(f"{path}: the file holds no scan{only}")
     scans = [scan for scan in (_scan(index, nodes[index]) for index in range(len(nodes))) if scan.records]
     if not scans:
         raise InputError(f"{path}: the file holds no points")
