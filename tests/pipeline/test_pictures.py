@@ -164,3 +164,10 @@ def test_what_cannot_be_placed_is_refused(conn: psycopg.Connection, example: str
     assert "--kind photo" in run("image", "import", NAME, path, "--kind", "thermal").stderr
     assert "leave out --band" in run("image", "import", NAME, path, "--kind", "photo", "--band", 1).stderr
     assert conn.execute("SELECT count(*) FROM tunnel.imported_image").fetchone() == (0,)
+
+
+def test_a_file_without_a_scan_names_the_command(example: str, surface, tmp_path: Path) -> None:
+    there = panorama(surface, camera_at(surface, 12336.0, 0.0, 0.0), Rotation.identity(), 360)
+    done = run("inspect", write_e57(tmp_path / "pictures.e57", [there, there]))
+    assert done.exit_code == 2
+    assert "only pictures (2): tunneldb image import" in done.stderr
