@@ -1,6 +1,6 @@
 """Pictures of E57 files: how they are projected, and where they were taken.
 
-Source: ASTM E2807-11, section 8.4.4 (images) and its subsections on the visual reference, pinhole, spherical and cylindrical
+Source: ASTM E2807-11, on images and their visual reference, pinhole, spherical and cylindrical
 representations.
 """
 

@@ -74,7 +74,7 @@ class Camera:
 def pixel_of(numbers: Float, x: float, y: float, z: float) -> tuple[float, float]:  # pragma: no cover - compiled
     """Return column and row of a point in the frame of a camera; NaN where a picture does not show it.
 
-    Source: ASTM E2807-11, section 8.4.4.
+    Source: ASTM E2807-11, on the representations of images.
 
     Parameters
     ----------
