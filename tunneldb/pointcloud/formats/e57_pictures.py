@@ -1,7 +1,6 @@
 """Pictures of E57 files: how they are projected, and where they were taken.
 
-Source: ASTM E2807-11, on images and their visual reference, pinhole, spherical and cylindrical
-representations.
+Source: ASTM E2807-11, on images and their visual reference, pinhole, spherical and cylindrical representations.
 """
 
 from __future__ import annotations
