@@ -118,7 +118,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--dsn", help="server to use; default: the embedded one")
     parser.add_argument("--length", type=float, default=25_000.0, help="length of the tunnel, m")
-    parser.add_argument("--turns", type=int, default=2, help="number of runs in each way, of which the least is stated")
+    parser.add_argument("--turns", type=int, default=2, help="number of runs in each way; the least time is stated")
     parser.add_argument("--full", action="store_true", help="full density")
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as temporary, scratch_database(arguments.dsn) as dsn:

@@ -108,7 +108,7 @@ def at(dock: Any) -> int | None:
 
 
 def pictures(dock: Any) -> dict[str, bool]:
-    """Whether each kind of image is shown."""
+    """Return for each kind of image whether it is shown."""
     return {kind: view.image is not None and not view.missing for kind, view in dock.views.items()}
 
 

@@ -29,7 +29,7 @@ MAX_FRAME_STRETCH = 0.1
 
 @dataclass(frozen=True)
 class ImportSettings:
-    """How an image is imported.
+    """Settings of an import.
 
     Attributes
     ----------

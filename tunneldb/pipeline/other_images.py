@@ -35,8 +35,8 @@ def measure_under_findings(
     image : str, optional
         Kind of one image; by default all are measured.
     """
-    outlines = load_outlines(conn, survey, low, high)
     around = load_outlines(conn, survey, low - MARGIN, high + MARGIN)
+    outlines = [one for one in around if one.polygon.bounds[2] >= low and one.polygon.bounds[0] <= high]
     for kind, number in measurable_images(conn, survey).items():
         if image in (None, kind):
             replace_rows(conn, number, outlines, _rows(_reader(conn, survey, kind), outlines, around))

@@ -15,7 +15,6 @@ from tunneldb.compiled import kernel, point_inner, point_kernel
 from tunneldb.raster.block_sums import MAX_STEPS, BlockSums
 from tunneldb.raster.grid import Grid
 from tunneldb.raster.projection import Pixels
-from tunneldb.threads import in_blocks, threads
 
 MEMORY = 400_000_000
 """Bytes of memory for sums."""
@@ -89,18 +88,11 @@ class Accumulator(BlockSums):
             If the temporary folder has no space for the blocks that do not fit in memory.
         """
         pixels = pixels.part(0, count)
-        for block in self._touched(pixels):
-            self._add(block, pixels)
-            self._changed.add(block)
 
-    def _add(self, block: int, pixels: Pixels) -> None:
-        """Add the points of a block; each thread has its own rows."""
-        sums, first, parts = self._fetch(block), block * self.grid.block_columns, threads()
-
-        def rows(part: int, _: int) -> None:
+        def add(sums: Whole, first: int, part: int, parts: int) -> None:
             _add(sums, first, *pixels, self._full, part, parts)
 
-        in_blocks(rows, parts, 1)
+        self._add_points(pixels, add)
 
     def window(self, start: int, stop: int) -> Window:
         """Return the means over the columns from ``start`` up to ``stop``, limited to the grid."""

@@ -6,6 +6,7 @@ import errno
 import os
 import tempfile
 from collections import OrderedDict
+from collections.abc import Callable
 from types import TracebackType
 from typing import BinaryIO, Self
 
@@ -16,6 +17,7 @@ from tunneldb.compiled import kernel
 from tunneldb.errors import UserError
 from tunneldb.raster.grid import Grid
 from tunneldb.raster.projection import WEIGHT, Pixels
+from tunneldb.threads import in_blocks, threads
 
 MAX_WEIGHT_SUM = 2**17 - WEIGHT
 """Sum of weights from which a pixel accepts no more points, so that no sum exceeds 2³¹. It is 2,047 points seen at right
@@ -70,6 +72,30 @@ class BlockSums:
         marked = np.zeros(self.grid.columns // width, np.bool_)
         _touched(pixels.column, width, marked)
         return sorted(np.flatnonzero(marked).tolist(), key=lambda block: block not in self._blocks)
+
+    def _add_points(self, pixels: Pixels, add: Callable[[Whole, int, int, int], None]) -> None:
+        """Add points to the blocks that they touch.
+
+        Parameters
+        ----------
+        pixels : Pixels
+            Pixels of the points; those with column -1 are skipped.
+        add : callable
+            Adds the points of a block; given its sums, its first column, the thread's part and the number of parts.
+
+        Raises
+        ------
+        UserError
+            If the temporary folder has no space for the blocks that do not fit in memory.
+        """
+        for block in self._touched(pixels):
+            self._add_to(block, add)
+
+    def _add_to(self, block: int, add: Callable[[Whole, int, int, int], None]) -> None:
+        """Add the points of a block; each thread has its own rows."""
+        sums, first, parts = self._fetch(block), block * self.grid.block_columns, threads()
+        in_blocks(lambda part, _: add(sums, first, part, parts), parts, 1)
+        self._changed.add(block)
 
     def blocks(self) -> list[int]:
         """Return the blocks, counted from 0, that have points."""

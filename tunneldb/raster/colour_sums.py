@@ -15,7 +15,6 @@ from tunneldb.raster.block_sums import MAX_STEPS, BlockSums
 from tunneldb.raster.grid import Grid
 from tunneldb.raster.profiles import ProfileGaps
 from tunneldb.raster.projection import Pixels
-from tunneldb.threads import in_blocks, threads
 
 MEMORY = 200_000_000
 """Bytes of memory for sums."""
@@ -66,18 +65,11 @@ class ColourSums(BlockSums):
         """
         pixels = pixels.part(0, len(colour))
         colour = np.ascontiguousarray(colour)
-        for block in self._touched(pixels):
-            self._add(block, pixels, colour, maximum)
-            self._changed.add(block)
 
-    def _add(self, block: int, pixels: Pixels, colour: UInt16, maximum: int) -> None:
-        """Add the points of a block; each thread has its own rows."""
-        sums, first, parts = self._fetch(block), block * self.grid.block_columns, threads()
-
-        def rows(part: int, _: int) -> None:
+        def add(sums: Whole, first: int, part: int, parts: int) -> None:
             _add(sums, first, pixels.row, pixels.column, pixels.weight, colour, maximum, self._full, part, parts)
 
-        in_blocks(rows, parts, 1)
+        self._add_points(pixels, add)
 
     def rgb(self, block: int, gaps: ProfileGaps | None) -> Single:
         """Return the mean colours (rows, columns of a block, 3) of a block with points, 0 to 255; NaN without a colour.
