@@ -11,7 +11,7 @@ from typing import Any
 
 import psycopg
 import pytest
-from playwright.sync_api import BrowserContext, Page, Route, expect
+from playwright.sync_api import APIResponse, BrowserContext, Page, Route, expect
 from support.desk_page import forgive, opened, sign_in, tab
 from support.desk_server import DeskServer
 from support.example_survey import NAME
@@ -309,6 +309,40 @@ def test_a_verdict_survives_a_restart_of_the_server(finding: Page, database: psy
     shows(page, 1, "confirmed")
     expect(page.locator("#alerts")).to_be_empty()
     forgive(page, "ERR_CONNECTION_REFUSED|status of 401|ERR_EMPTY_RESPONSE|ERR_CONNECTION_RESET")
+
+
+def test_a_verdict_that_is_written_while_its_finding_is_read_is_shown(finding: Page, database: psycopg.Connection) -> None:
+    """The finding is read before the verdict, and the answer comes after it: what is shown is what the database has."""
+    page = finding
+    page.route("**/api/findings/1", lambda route: route.abort())
+    page.keyboard.press("c")
+    expect(page.locator("#alerts")).to_contain_text(WAITS)
+    page.unroute("**/api/findings/1")
+    reads: list[tuple[Route, APIResponse]] = []
+    writes: list[Route] = []
+
+    def hold(route: Route) -> None:
+        if route.request.method == "PATCH":
+            writes.append(route)
+        elif reads:
+            route.continue_()
+        else:
+            reads.append((route, route.fetch()))
+
+    page.route("**/api/findings/1", hold)
+    page.reload()
+    while not (reads and writes):
+        page.wait_for_timeout(50)
+    with page.expect_response(lambda response: response.request.method == "PATCH"):
+        writes[0].continue_()
+    assert verdict(database) == "confirmed"
+    expect(page.locator("#alerts")).to_be_empty()
+    route, response = reads[0]
+    assert response.json()["review"] == "open"
+    route.fulfill(response=response)
+    shows(page, 1, "confirmed")
+    page.unroute("**/api/findings/1")
+    forgive(page, "ERR_FAILED")
 
 
 def test_list_asked_for_while_a_finding_is_read_is_read_after_it(page: Page) -> None:

@@ -61,7 +61,7 @@ function showRecords() {
 /** Show what the server wrote of a record that had waited. */
 function sent(record, answer) {
   const id = record.type === 'draw' ? answer.id : record.finding;
-  if (app.finding === findingOf(record) && !review.busy) review.open(id, false);
+  review.renew(findingOf(record), id);
   app.renew = [...(app.renew ?? []), id];
   renewHeld();
   changed();

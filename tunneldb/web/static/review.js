@@ -24,6 +24,7 @@ export class Review {
     this.app = app;
     this.busy = false;
     this.waiting = null;
+    this.written = new Map();
     this.keysOn = true;
     this.reviewing = false;
     this.typed = false;
@@ -92,6 +93,12 @@ export class Review {
       await this.session.open(id);
       this.shown(fit);
     });
+  }
+
+  /** Read a finding again, if it is shown, now that the database has what waited for it; its number then may be another one. */
+  renew(shown, id) {
+    if (this.busy) this.written.set(shown, id);
+    else if (this.session.facts?.id === shown) this.open(id, false);
   }
 
   /** Read the list of a selection; if a finding is being read, after it. */
@@ -197,6 +204,13 @@ export class Review {
       this.busy = false;
       this.root.removeAttribute('aria-busy');
       this.refresh();
+    }
+    // The finding may have been read before the database had what waited for it.
+    const stale = this.written.get(this.session.facts?.id);
+    this.written.clear();
+    if (stale !== undefined) {
+      this.open(stale, false);
+      return;
     }
     const { waiting } = this;
     this.waiting = null;
