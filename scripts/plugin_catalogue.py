@@ -16,7 +16,8 @@ from tunneldb.cli.output import JSON, Command
 GROUPS = {
     "1 Begin": ("init", "check", "inspect", "tunnel add", "survey add"),
     "2 Stages": ("load", "run", "batch", "status", "members", "spheres"),
-    "3 Leaks and findings": ("leaks", "findings list", "findings import", "spots", "learn", "evaluate"),
+    "3 Leaks and findings": ("leaks", "findings list", "findings import", "findings trace", "findings searched",
+                             "elements cracks", "spots", "learn", "evaluate"),
     "4 Shape and change": (
         "compare", "axis", "profile add", "deviation", "evenness", "thickness", "rings", "clearance", "intensity",
     ),

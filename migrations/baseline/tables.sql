@@ -910,6 +910,26 @@ COMMENT ON COLUMN tunnel.coverage.lining_sums IS 'Sum of lining before each step
 COMMENT ON COLUMN tunnel.coverage.seen_sums IS 'Sum of seen before each step, and of all, m²';
 COMMENT ON COLUMN tunnel.coverage.wet_sums IS 'Sum of wet before each step, and of all, m²';
 
+CREATE TABLE tunnel.crack_search (
+    id INTEGER GENERATED ALWAYS AS IDENTITY,
+    survey_id INTEGER NOT NULL,
+    area geometry(MULTIPOLYGON,-1) NOT NULL,
+    source TEXT NOT NULL,
+    recorded_by TEXT DEFAULT SESSION_USER NOT NULL,
+    recorded_at TIMESTAMP WITH TIME ZONE DEFAULT clock_timestamp() NOT NULL,
+    CONSTRAINT crack_search_pkey PRIMARY KEY (id),
+    CONSTRAINT crack_search_source_check CHECK (char_length(source) BETWEEN 1 AND 1000),
+    CONSTRAINT crack_search_survey_id_fkey FOREIGN KEY(survey_id) REFERENCES tunnel.survey (id) ON DELETE CASCADE
+);
+COMMENT ON TABLE tunnel.crack_search IS 'Parts of the lining that a person or a network searched for cracks: only there, no crack means that there is none';
+COMMENT ON COLUMN tunnel.crack_search.id IS 'Key';
+COMMENT ON COLUMN tunnel.crack_search.survey_id IS 'Survey that the row belongs to';
+COMMENT ON COLUMN tunnel.crack_search.area IS 'In the unrolled plane (chainage, arc), m';
+COMMENT ON COLUMN tunnel.crack_search.source IS 'What was searched, such as the name of a file';
+COMMENT ON COLUMN tunnel.crack_search.recorded_by IS 'Role that recorded it';
+COMMENT ON COLUMN tunnel.crack_search.recorded_at IS 'Time when it was recorded';
+CREATE INDEX crack_search_survey_id_idx ON tunnel.crack_search (survey_id);
+
 CREATE TABLE tunnel.dark_band (
     survey_id INTEGER NOT NULL,
     km INTEGER NOT NULL,

@@ -112,6 +112,7 @@ BEGIN
         tunnel_api.action, tunnel_api.action_map, tunnel_api.action_unrolled TO tunnel_inspector;
     GRANT EXECUTE ON FUNCTION tunnel_api.finding_split(bigint, geometry), tunnel_api.finding_merge(bigint[]),
         tunnel_api.finding_undo(bigint), tunnel_api.finding_photo_add(bigint, bytea, text),
+        tunnel_api.crack_search_add(text, geometry, text), tunnel_api.crack_search_remove(int),
         tunnel_api.show_as_of(text, timestamptz) TO tunnel_inspector;
 END
 $$;

@@ -289,7 +289,7 @@ def test_the_density_of_cracks_is_their_length_by_the_lining_of_each_element(
         assert sum(by_class) == pytest.approx(length)
         if 12310 <= start <= 12480:
             assert lining == pytest.approx(10 * GIRTH, rel=0.01)
-            assert density == pytest.approx(sum(inside) / (10 * GIRTH), rel=0.02)
+            assert density == (pytest.approx(sum(inside) / (10 * GIRTH), rel=0.02) if number else None)
         assert width == max((w for w, part in zip(WIDTHS, inside, strict=True) if part > 0 and w), default=None)
     whole, zones = (
         conn.execute(
@@ -327,3 +327,96 @@ def test_lists_and_the_report_state_the_orientation(example: str, tmp_path: Path
     page = (tmp_path / "report.html").read_text("utf-8")
     for said in ("longitudinal, 0°", "transverse, 90°", "oblique, 45°"):
         assert said in page
+
+
+def test_a_second_import_adds_nothing(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:
+    path, options = write_cracks(tmp_path, "gpkg", space=False)
+    told("findings", "import", NAME, path, *options)
+    first = cracks(conn)
+    done = told("findings", "import", NAME, path, *options)
+    assert (done["imported"], done["kinds"]) == (0, {})
+    assert done["notes"] == [f"{path}: left out: 4 findings of the same kind and outline as one in the survey"]
+    assert cracks(conn) == first
+    # another kind at the same place is another finding, and what is new is added
+    assert told("findings", "import", NAME, path, "--kind", "damaged_joint")["kinds"] == {"damaged_joint": 4}
+    more = write_layer(tmp_path / "more.gpkg", [*LINES, shapely.LineString([(12345, 0), (12346, 0)])], kind=["crack"] * 5)
+    assert told("findings", "import", NAME, more)["imported"] == 1
+    assert len(cracks(conn)) == 5
+
+
+def test_a_mask_traced_twice_adds_nothing(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:
+    path = write_png(tmp_path / "mask.png", mask(DRAWN, WIDTH, PLACE, 2800, 1500))
+    points = control(tmp_path / "points.csv", 2800, 1500)
+    first = told("findings", "trace", NAME, path, "--points", points)
+    # the strip of 14 m by 7.5 m lies within the lining
+    assert first["searched"] == pytest.approx(14.0 * 7.5, rel=0.005)
+    again = told("findings", "trace", NAME, path, "--points", points)
+    assert (again["ids"], again["repeated"], again["searched"]) == ([], 3, first["searched"])
+    assert len(cracks(conn)) == 3
+    assert [row["area"] for row in told("findings", "searched", NAME)["searches"]] == [first["searched"]]
+
+
+def densities(name: str) -> dict[float, tuple[float, float | None]]:
+    """Return searched share and density of the elements by chainage at which they begin."""
+    rows = [row for row in told("elements", "cracks", NAME, name)["elements"] if row["lining_area"] > 0]
+    return {float(row["label_from"].replace("+", "")): (row["searched_share"], row["density"]) for row in rows}
+
+
+def test_no_crack_is_a_density_of_0_only_where_somebody_searched(example: str, tmp_path: Path) -> None:
+    path, options = write_cracks(tmp_path, "gpkg", space=False)
+    told("findings", "import", NAME, path, *options)
+    assert run("elements", "add", "demo", "tens", "--length", 10).exit_code == 0
+    assert "it is not recorded that any part" in run("findings", "searched", NAME).stdout
+    before = densities("tens")
+    assert {share for share, _ in before.values()} == {0.0}
+    assert {start for start, (_, density) in before.items() if density is not None} == {12310.0, 12330.0, 12340.0, 12350.0}
+    done = told("findings", "searched", NAME, "--from", 12315, "--to", 12330, "--source", "photos of March")
+    assert [(row["chainage_from"], row["chainage_to"], row["source"]) for row in done["searches"]] == [
+        (12315.0, 12330.0, "photos of March")
+    ]
+    after = densities("tens")
+    assert after[12310.0] == (pytest.approx(0.5, abs=0.01), before[12310.0][1])
+    assert after[12320.0] == (pytest.approx(1.0, abs=1e-3), 0.0)
+    assert {start: row for start, row in after.items() if start > 12325} == {
+        start: row for start, row in before.items() if start > 12325
+    }
+    printed = run("elements", "cracks", NAME, "tens")
+    (line,) = (line for line in printed.stdout.splitlines() if "12+310" in line and "12+320" in line)
+    assert f"≥ {after[12310.0][1]:.3f}" in line
+    unknown = sum(density is None for _, density in after.values())
+    assert f"Note: {unknown} elements not known to be searched for cracks" in printed.stderr
+    # by zones: what was searched all round was searched in each
+    assert run("elements", "add", "demo", "zones of tens", "--length", 10, "--zones").exit_code == 0
+    rows = told("elements", "cracks", NAME, "zones of tens")["elements"]
+    assert {round(row["searched_share"], 2) for row in rows if row["label_from"] == "12+320.000"} == {1.0}
+    (key,) = (row["id"] for row in done["searches"])
+    assert told("findings", "searched", NAME, "--remove", key)["searches"] == []
+    assert densities("tens") == before
+
+
+def test_a_wrong_search_is_one_line(example: str) -> None:
+    for options, message in (
+        (["--from", "12315"], "need --source TEXT"),
+        (["--source", "x", "--remove", "1"], "exclude each other"),
+        (["--remove", "9"], "has no search with number 9"),
+        (["--from", "99000", "--source", "x"], "lies beside this stretch"),
+    ):
+        assert message in refused("findings", "searched", NAME, *options), options
+
+
+@pytest.mark.parametrize(
+    ("shape", "source", "message"),
+    [
+        ("POINT(12315 0)", "x", "no valid polygon"),
+        ("POLYGON((0 0,1 1,1 0,0 1,0 0))", "x", "no valid polygon"),
+        ("POLYGON((0 0,1 0,1 1,0 0))", "x", "does not meet the lining"),
+        ("POLYGON EMPTY", "x", "does not meet the lining"),
+        ("POLYGON((12315 0,12316 0,12316 1,12315 0))", "", "it is not said what"),
+        ("POLYGON((12315 0,12316 0,12316 1,12315 0))", "x" * 1001, "has 1001 characters"),
+    ],
+)
+def test_an_area_that_is_none_of_the_lining_is_refused(
+    conn: psycopg.Connection, example: str, shape: str, source: str, message: str
+) -> None:
+    with pytest.raises(psycopg.errors.DataError, match=message):
+        conn.execute("SELECT tunnel_api.crack_search_add(%s, ST_GeomFromText(%s), %s)", [NAME, shape, source])

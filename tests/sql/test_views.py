@@ -129,6 +129,7 @@ def test_every_view_begins_with_a_stable_integer_key(
         " SELECT id, 'thermal', 'thermal', false, '°C', 8, 20, 0.001, 0.02, 'coordinates', 1, 12310, 12390, -8, 8, 'a.tif',"
         " '{}' FROM tunnel.survey WHERE name = 'demo-2024'"
     )
+    conn.execute("SELECT tunnel_api.crack_search_add('demo-2024', ST_MakeEnvelope(12310, -2, 12320, 2), 'photos')")
     conn.execute(
         "INSERT INTO tunnel.finding_image (finding_id, imported_image_id, outline_key, mean, surroundings, spread, share)"
         " SELECT f.id, i.id, tunnel_internal.outline_key(f.unrolled), 10.2, 11, 0.2, 1"

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -13,6 +15,9 @@ from tunneldb.cli.tables import print_table
 from tunneldb.counted import counted
 from tunneldb.database import connect
 from tunneldb.errors import UserError
+
+WHOLE = 0.999
+"""Share of the lining of an element from which it counts as searched in whole: areas of curved sections differ by less."""
 
 
 @click.group(cls=CommandGroup)
@@ -106,9 +111,9 @@ def list_(settings: Settings, tunnel: str) -> None:
 def cracks(settings: Settings, survey: str, name: str) -> None:
     """Show the density of cracks of SURVEY in each element of the division NAME.
 
-    The density is the length of the counted cracks by the area of the lining, m/m². Lengths are also stated for
-    longitudinal (less than 30° to the axis), oblique and transverse cracks (more than 60°). 0 means that no crack was
-    drawn or imported there: whether anybody looked for cracks is not recorded.
+    The density is the length of the counted cracks by the area of the lining, m/m²; a lower bound (≥) if less than the
+    whole lining of the element was searched for cracks; none if nothing was (tunneldb findings searched). Lengths are
+    also stated for longitudinal (less than 30° to the axis), oblique and transverse cracks (more than 60°).
     """
     from tunneldb.store.crack_density import read_crack_density
     from tunneldb.store.survey import get_survey
@@ -121,6 +126,7 @@ def cracks(settings: Settings, survey: str, name: str) -> None:
         "from",
         "to",
         "lining m²",
+        "searched %",
         "cracks",
         "length m",
         "m/m²",
@@ -131,14 +137,23 @@ def cracks(settings: Settings, survey: str, name: str) -> None:
     ]
     cells = [
         [
-            row["name"], row["label_from"], row["label_to"], f"{row['lining_area']:.1f}", row["cracks"],
-            f"{row['crack_length']:.2f}", None if row["density"] is None else f"{row['density']:.3f}",
+            row["name"], row["label_from"], row["label_to"], f"{row['lining_area']:.1f}",
+            math.floor(100 * (row["searched_share"] + 1 - WHOLE)), row["cracks"], f"{row['crack_length']:.2f}", _density(row),
             f"{row['longitudinal_length']:.2f}", f"{row['oblique_length']:.2f}", f"{row['transverse_length']:.2f}",
             None if row["width_mm"] is None else f"{row['width_mm']:.2f}",
         ]
         for row in rows
     ]  # fmt: skip
-    print_table(header, cells, right=range(1, 11))
+    print_table(header, cells, right=range(1, 12))
+    if unknown := sum(row["density"] is None and row["lining_area"] > 0 for row in rows):
+        notify(f"Note: {counted(unknown, 'element')} not known to be searched for cracks: tunneldb findings searched {survey}")
+
+
+def _density(row: dict[str, Any]) -> str | None:
+    """Return a density in words: a lower bound if not the whole element was searched."""
+    if row["density"] is None:
+        return None
+    return f"{'' if row['searched_share'] >= WHOLE else '≥ '}{row['density']:.3f}"
 
 
 @elements.command(examples=["tunneldb elements remove ringo blocks"])

@@ -11,6 +11,7 @@ import click
 import psycopg
 
 from tunneldb.cli.coverage import say_coverage, say_remarks
+from tunneldb.cli.findings_searched import searched
 from tunneldb.cli.findings_trace import trace
 from tunneldb.cli.leaks import parse_clock
 from tunneldb.cli.main import Settings
@@ -44,6 +45,7 @@ def findings() -> None:
 
 
 findings.add_command(trace)
+findings.add_command(searched)
 
 
 @findings.command(

@@ -38,7 +38,8 @@ def trace(settings: Settings, survey: str, file: Path, points: Path | None, band
     image import: by its own coordinates, by control points (--points), or by the table of frames. The areas
     are thinned to lines. A crack has the length of its line, and as width the area of the mask divided by the length.
 
-    Shorter lines than --min-length are left out, also areas wider than 100 mm, and lines beyond the lining.
+    Shorter lines than --min-length are left out, also areas wider than 100 mm, lines beyond the lining, and cracks that
+    SURVEY has already. The area of the masks is recorded as searched for cracks.
     """
     from tunneldb.pipeline.trace_mask import MAX_WIDTH, trace_mask
 
@@ -54,13 +55,16 @@ def trace(settings: Settings, survey: str, file: Path, points: Path | None, band
         notify(f"Note: left out: {counted(done.wide, 'area')} wider than {MAX_WIDTH:g} mm")
     if done.beyond:
         notify(f"Warning: left out: {counted(done.beyond, 'crack')} beyond the lining")
+    if done.repeated:
+        notify(f"Note: left out: {counted(done.repeated, 'crack')} that the survey has already")
     widths = [line.width_mm for line in done.lines]
     add_to_json(
         survey=survey, ids=done.ids, length=sum(line.length for line in done.lines), short=done.short,
-        short_length=done.short_length, wide=done.wide, beyond=done.beyond, warnings=done.warnings, notes=done.notes,
-        points=done.points,
+        short_length=done.short_length, wide=done.wide, beyond=done.beyond, repeated=done.repeated, searched=done.searched,
+        warnings=done.warnings, notes=done.notes, points=done.points,
     )  # fmt: skip
+    size = f", mask {min(widths):.1f} to {max(widths):.1f} mm wide" if widths else ""
     click.echo(
-        f"{survey}: {counted(len(done.ids), 'crack')} traced, {sum(line.length for line in done.lines):.2f} m, mask"
-        f" {min(widths):.1f} to {max(widths):.1f} mm wide"
+        f"{survey}: {counted(len(done.ids), 'crack')} traced, {sum(line.length for line in done.lines):.2f} m{size}; searched:"
+        f" {done.searched:.1f} m²"
     )

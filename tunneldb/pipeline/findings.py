@@ -16,6 +16,7 @@ import shapely
 from psycopg import sql
 from shapely.geometry.base import BaseGeometry
 
+from tunneldb.counted import counted
 from tunneldb.csvfile import find_column, read_header, read_texts, row_lines
 from tunneldb.errors import UserError
 from tunneldb.numerals import parse_number
@@ -68,7 +69,8 @@ def import_findings(
 ) -> Imported:
     """Import findings from a CSV, GeoPackage, GeoJSON or DXF file in one transaction; none if any row is wrong.
 
-    Each part of a multi-part line is a finding, after parts that meet end to end were joined.
+    Each part of a multi-part line is a finding, after parts that meet end to end were joined. Findings that the survey has
+    already, of the same kind and outline, are left out: a second import adds nothing.
 
     Parameters
     ----------
@@ -104,6 +106,7 @@ def import_findings(
     else:
         rows = require_within(conn, survey, path, read_layer(path, survey, columns, layer, needed))
     made: Counter[str] = Counter()
+    repeated = 0
     for row in rows:
         theirs = row.values.get("kind", "")
         if row.shape is None and theirs in (*GAP_STATES, REMARK):  # a list of findings begins with such rows
@@ -112,8 +115,11 @@ def import_findings(
         parts = _parts(row.shape)
         try:
             with conn.transaction():
-                ids += [insert_finding(conn, survey, replace(row, shape=part), ours) for part in parts]
-            made[ours] += len(parts)
+                found = [insert_once(conn, survey, replace(row, shape=part), ours) for part in parts]
+            new = [key for key in found if key is not None]
+            ids += new
+            made[ours] += len(new)
+            repeated += len(found) - len(new)
         except ValueError as error:
             wrong.append(f"{path}, row {row.number}: {error}")
         except psycopg.Error as error:
@@ -122,7 +128,9 @@ def import_findings(
         conn.rollback()
         return Imported(Counter(), [], wrong)
     conn.commit()
-    return Imported(made, ids, [], notes)
+    if repeated:
+        notes.append(f"{path}: left out: {counted(repeated, 'finding')} of the same kind and outline as one in the survey")
+    return Imported(+made, ids, [], notes)
 
 
 def _parts(shape: BaseGeometry | None) -> list[BaseGeometry | None]:
@@ -130,6 +138,27 @@ def _parts(shape: BaseGeometry | None) -> list[BaseGeometry | None]:
     if isinstance(shape, shapely.MultiLineString) and len(shape.geoms) > 1:
         return list(shapely.get_parts(shapely.line_merge(shape)))
     return [shape]
+
+
+def insert_once(conn: psycopg.Connection[Any], survey: Survey, row: Row, kind: str) -> int | None:
+    """Insert a finding, and return its id; None if the survey has a drawn one of the same kind and outline.
+
+    Raises
+    ------
+    ValueError, psycopg.Error
+        If it is wrong; the message is for the person who imports it.
+    """
+    query = (
+        "SELECT count(*) FROM tunnel_api.finding n JOIN tunnel_api.finding o ON o.survey_id = n.survey_id AND o.id <> n.id"
+        " AND o.chainage_from = n.chainage_from AND o.chainage_to = n.chainage_to AND o.kind = n.kind AND o.manual"
+        " AND public.ST_Equals(o.unrolled, n.unrolled) WHERE n.id = %s"
+    )
+    with conn.transaction():
+        key = insert_finding(conn, survey, row, kind)
+        repeated = conn.execute(query, [key]).fetchone() != (0,)
+        if repeated:
+            raise psycopg.Rollback
+    return None if repeated else key
 
 
 def insert_finding(conn: psycopg.Connection[Any], survey: Survey, row: Row, kind: str) -> int:

@@ -16,7 +16,7 @@ from tunneldb.counted import counted
 from tunneldb.errors import InputError
 from tunneldb.finding_kind import FindingKind
 from tunneldb.pipeline.finding_layers import Row
-from tunneldb.pipeline.findings import insert_finding
+from tunneldb.pipeline.findings import insert_once
 from tunneldb.pipeline.image_placement import ControlPoint, ImportSettings, place_image
 from tunneldb.raster.placement.checks import Lining
 from tunneldb.raster.placement.mapping import Bounds, inverse, pixel_sides
@@ -24,6 +24,7 @@ from tunneldb.raster.placement.resample import Frame, Source
 from tunneldb.raster.tracing.joining import TracedLine, join_images
 from tunneldb.raster.tracing.lines import trace
 from tunneldb.raster.tracing.thinning import thin
+from tunneldb.store.crack_search import add_crack_search
 from tunneldb.store.imported_images import section_extent
 from tunneldb.store.survey import Survey
 
@@ -45,6 +46,9 @@ MAX_WIDTH = 100.0
 MAX_GAP, MAX_GAP_PIXELS = 0.02, 3.0
 """Maximum distance of a line and its continuation in the next frame, m and pixels."""
 
+EDGE = 16
+"""Number of points by which an edge of a frame is placed."""
+
 SIMPLIFICATION = 0.5
 """Maximum distance of a line from the traced one, pixels."""
 
@@ -61,8 +65,10 @@ class TracedResult:
         Cracks.
     short, short_length : int, float
         Number of pieces that are shorter than the minimum, and their length, m.
-    wide, beyond : int
-        Number of areas that are too wide for a crack, and of lines beyond the lining.
+    wide, beyond, repeated : int
+        Number of areas that are too wide for a crack, of lines beyond the lining, and of cracks that the survey has already.
+    searched : float
+        Area of the masks on the lining, m².
     warnings, notes : list of str
         Of the placement.
     points : list of ControlPoint
@@ -74,6 +80,8 @@ class TracedResult:
     short_length: float
     wide: int
     beyond: int
+    repeated: int
+    searched: float
     warnings: list[str]
     notes: list[str]
     points: list[ControlPoint]
@@ -89,6 +97,8 @@ def trace_mask(
     progress: Callable[[str, float | None], Callable[[float], None]],
 ) -> TracedResult:
     """Trace the cracks of a mask, or of a table of masks, and add them as open findings in one transaction.
+
+    The area of the masks is recorded as searched for cracks.
 
     Parameters
     ----------
@@ -120,16 +130,18 @@ def trace_mask(
     if not cracks:
         raise InputError(
             f"{path}: the mask has no crack of at least {min_length:g} m: {counted(short, 'shorter line')},"
-            f" {counted(len(long), 'area')} wider than {MAX_WIDTH:g} mm; --min-length allows shorter ones"
+            f" {counted(len(long), 'area')} wider than {MAX_WIDTH:g} mm; --min-length allows shorter ones; if the"
+            " mask rightly has none, record that by: tunneldb findings searched"
         )
-    ids, drawn = _insert(conn, survey, path, cracks, progress("cracks", len(cracks)))
-    if not drawn:
+    ids, drawn, beyond = _insert(conn, survey, path, cracks, progress("cracks", len(cracks)))
+    if beyond == len(cracks):
         raise InputError(f"{path}: all {counted(len(cracks), 'crack')} of the mask reach beyond the survey's lining")
+    searched = add_crack_search(conn, survey, shapely.union_all([_outline(frame) for frame in placement.frames]), path.name)
     conn.commit()
     short_length = sum(line.length for line in lines if line.length < min_length)
     return TracedResult(
-        ids, drawn, short, short_length, len(long) - len(cracks), len(cracks) - len(drawn), placement.placed.warnings,
-        placement.notes, placement.points,
+        ids, drawn, short, short_length, len(long) - len(cracks), beyond, len(cracks) - len(drawn) - beyond, searched,
+        placement.placed.warnings, placement.notes, placement.points,
     )  # fmt: skip
 
 
@@ -139,20 +151,29 @@ def _insert(
     path: Path,
     cracks: Sequence[TracedLine],
     advance: Callable[[float], None],
-) -> tuple[list[int], list[TracedLine]]:
-    """Insert cracks as open findings; return ids and lines of those that do not reach beyond the lining."""
-    ids, drawn = [], []
+) -> tuple[list[int], list[TracedLine], int]:
+    """Insert new cracks as open findings; return their ids and lines, and the number of those beyond the lining."""
+    ids, drawn, beyond = [], [], 0
     for number, line in enumerate(cracks, start=1):
         values = {"width_mm": f"{line.width_mm:.3f}", "review": "open", "remark": f"traced in {path.name}"}
         try:
-            with conn.transaction():
-                row = Row(number, values, shapely.LineString(line.points), "unrolled")
-                ids.append(insert_finding(conn, survey, row, FindingKind.CRACK))
-            drawn.append(line)
+            key = insert_once(conn, survey, Row(number, values, shapely.LineString(line.points), "unrolled"), FindingKind.CRACK)
         except psycopg.errors.InvalidParameterValue:  # beyond the lining
-            pass
+            beyond += 1
+        else:
+            if key is not None:
+                ids.append(key)
+                drawn.append(line)
         advance(1)
-    return ids, drawn
+    return ids, drawn, beyond
+
+
+def _outline(frame: Frame) -> shapely.Polygon:
+    """Return the outline of a frame in the unrolled plane; its edges may be bent."""
+    share = np.linspace(0.0, 1.0, EDGE, endpoint=False)
+    column = np.concatenate((share, np.ones(EDGE), 1.0 - share, np.zeros(EDGE))) * frame.source.columns
+    row = np.concatenate((np.zeros(EDGE), share, np.ones(EDGE), 1.0 - share)) * frame.source.rows
+    return shapely.Polygon(np.column_stack(frame.mapping.forward(column, row)))
 
 
 def _traced(

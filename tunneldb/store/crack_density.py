@@ -19,9 +19,9 @@ def read_crack_density(conn: psycopg.Connection[Any], survey: Survey, name: str)
     rows = (
         conn.cursor(row_factory=dict_row)
         .execute(
-            "SELECT d.number, d.name, d.label_from, d.label_to, d.lining_area, d.cracks, d.crack_length, d.density,"
-            " d.longitudinal_length, d.transverse_length, d.oblique_length, d.width_mm FROM tunnel_api.crack_density d"
-            " WHERE d.survey_id = %s AND d.element_set = %s ORDER BY d.number",
+            "SELECT d.number, d.name, d.label_from, d.label_to, d.lining_area, d.searched_share, d.cracks, d.crack_length,"
+            " d.density, d.longitudinal_length, d.transverse_length, d.oblique_length, d.width_mm"
+            " FROM tunnel_api.crack_density d WHERE d.survey_id = %s AND d.element_set = %s ORDER BY d.number",
             [survey.id, name],
         )
         .fetchall()

@@ -239,6 +239,27 @@ class Finding(Review, Base):
     )
 
 
+class CrackSearch(Base):
+    """Part of the lining that was searched for cracks."""
+
+    __tablename__ = "crack_search"
+    __table_args__ = (
+        CheckConstraint("char_length(source) BETWEEN 1 AND 1000", name="source"),
+        Index(None, "survey_id"),
+        {
+            "comment": "Parts of the lining that a person or a network searched for cracks: only there, no crack means that "
+            "there is none"
+        },
+    )
+
+    id: Mapped[int] = mapped_column(Identity(always=True), primary_key=True, comment="Key")
+    survey_id: Mapped[int] = mapped_column(parent("survey"), comment=SURVEY)
+    area: Mapped[WKBElement] = mapped_column(geometry("MULTIPOLYGON"), comment="In the unrolled plane (chainage, arc), m")
+    source: Mapped[str] = mapped_column(comment="What was searched, such as the name of a file")
+    recorded_by: Mapped[str] = mapped_column(server_default=text("SESSION_USER"), comment="Role that recorded it")
+    recorded_at: Mapped[dt.datetime] = mapped_column(server_default=CLOCK, comment="Time when it was recorded")
+
+
 class Photo(Base):
     """Photo of a finding."""
 
