@@ -15,3 +15,14 @@ LANGUAGE sql IMMUTABLE CALLED ON NULL INPUT PARALLEL SAFE SET search_path = pg_c
 $$;
 COMMENT ON FUNCTION tunnel_internal.contrast_words(float8, text, boolean) IS
     'A difference of values with two digits and its unit, for example -0.83 K; of colours, in CIE lightness: 12 L* darker';
+
+CREATE OR REPLACE VIEW tunnel_internal.other_images AS
+SELECT v.finding_id, v.outline_key,
+       string_agg(coalesce(i.name, 'rgb') || ' ' || tunnel_internal.contrast_words(v.mean - v.surroundings, i.unit, i.colour IS NOT FALSE),
+                  ', ' ORDER BY i.name NULLS FIRST) AS words,
+       max(abs(v.mean - v.surroundings) / nullif(v.spread, 0)) AS contrast
+  FROM tunnel.finding_image v
+  LEFT JOIN tunnel.imported_image i ON i.id = v.imported_image_id
+ GROUP BY v.finding_id, v.outline_key;
+COMMENT ON VIEW tunnel_internal.other_images IS
+    'Differences of outlines from the lining around them in other images: in words, and the greatest in standard deviations of the lining';

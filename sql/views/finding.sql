@@ -98,13 +98,10 @@ SELECT a.id, a.survey_id, s.name AS survey, a.km,
            AS state,
        (SELECT count(*) FROM tunnel.photo p WHERE p.finding_id = a.id) AS photos,
        tunnel_internal.evidence_text(a.evidence) AS evidence, a.model, a.superseded,
-       (SELECT string_agg(coalesce(i.name, 'rgb') || ' '
-                          || tunnel_internal.contrast_words(v.mean - v.surroundings, i.unit, i.colour IS NOT FALSE), ', '
-                          ORDER BY i.name NULLS FIRST)
-          FROM tunnel.finding_image v LEFT JOIN tunnel.imported_image i ON i.id = v.imported_image_id
-         WHERE v.finding_id = a.id AND v.outline_key = tunnel_internal.outline_key(a.unrolled)) AS other_images,
-       (SELECT max(abs(v.mean - v.surroundings) / nullif(v.spread, 0)) FROM tunnel.finding_image v
-         WHERE v.finding_id = a.id AND v.outline_key = tunnel_internal.outline_key(a.unrolled)) AS other_contrast,
+       (SELECT i.words FROM tunnel_internal.other_images i
+         WHERE i.finding_id = a.id AND i.outline_key = tunnel_internal.outline_key(a.unrolled)) AS other_images,
+       (SELECT i.contrast FROM tunnel_internal.other_images i
+         WHERE i.finding_id = a.id AND i.outline_key = tunnel_internal.outline_key(a.unrolled)) AS other_contrast,
        (public.st_xmin(coalesce(a.shape_surface, a.surface)) + public.st_xmax(coalesce(a.shape_surface, a.surface))) / 2 AS easting,
        (public.st_ymin(coalesce(a.shape_surface, a.surface)) + public.st_ymax(coalesce(a.shape_surface, a.surface))) / 2 AS northing,
        (public.st_zmin(coalesce(a.shape_surface, a.surface)) + public.st_zmax(coalesce(a.shape_surface, a.surface))) / 2 AS height,
@@ -237,13 +234,10 @@ SELECT a.id, a.survey_id, s.name AS survey, a.km,
        a.detected AND a.review <> 'rejected' AS counted,
        tunnel_internal.evidence_text(a.evidence) AS evidence, a.model, a.wet, a.origin, a.severity,
        v.label AS severity_label, a.drawn_by, a.drawn_at,
-       (SELECT string_agg(coalesce(i.name, 'rgb') || ' '
-                          || tunnel_internal.contrast_words(v.mean - v.surroundings, i.unit, i.colour IS NOT FALSE), ', '
-                          ORDER BY i.name NULLS FIRST)
-          FROM tunnel.finding_image v LEFT JOIN tunnel.imported_image i ON i.id = v.imported_image_id
-         WHERE v.finding_id = a.id AND v.outline_key = tunnel_internal.outline_key(a.unrolled)) AS other_images,
-       (SELECT max(abs(v.mean - v.surroundings) / nullif(v.spread, 0)) FROM tunnel.finding_image v
-         WHERE v.finding_id = a.id AND v.outline_key = tunnel_internal.outline_key(a.unrolled)) AS other_contrast,
+       (SELECT i.words FROM tunnel_internal.other_images i
+         WHERE i.finding_id = a.id AND i.outline_key = tunnel_internal.outline_key(a.unrolled)) AS other_images,
+       (SELECT i.contrast FROM tunnel_internal.other_images i
+         WHERE i.finding_id = a.id AND i.outline_key = tunnel_internal.outline_key(a.unrolled)) AS other_contrast,
        (public.st_xmin(coalesce(a.shape_surface, a.surface)) + public.st_xmax(coalesce(a.shape_surface, a.surface))) / 2 AS easting,
        (public.st_ymin(coalesce(a.shape_surface, a.surface)) + public.st_ymax(coalesce(a.shape_surface, a.surface))) / 2 AS northing,
        (public.st_zmin(coalesce(a.shape_surface, a.surface)) + public.st_zmax(coalesce(a.shape_surface, a.surface))) / 2 AS height,
