@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
 from scipy.signal import fftconvolve
 from scipy.spatial.transform import Rotation
 
-from tunneldb.arrays import Float
+from tunneldb.arrays import Float, Int64
 from tunneldb.errors import UserError
 from tunneldb.registration.underwater.ladder_shape import PlacedLadder
 from tunneldb.registration.underwater.walls import Walls
@@ -306,6 +307,43 @@ def _correlate(
     return out
 
 
+@dataclass(frozen=True)
+class _Picture:
+    """A ladder below the water, seen square to its plane.
+
+    Attributes
+    ----------
+    low, high : (2,) float64 array
+        Corners in the ladder's own axes, across and up, m.
+    size : (2,) int64 array
+        Pixels.
+    image : (n, m) float64 array
+        Deviations from the mean, with a norm of 1.
+    """
+
+    low: Float
+    high: Float
+    size: Int64
+    image: Float
+
+
+@lru_cache(maxsize=256)
+def _picture(placed: PlacedLadder) -> _Picture | None:
+    """Return the picture of a ladder in the local frame, with the water at zero; None if no part is below the water."""
+    begin, end = placed.elements()
+    share = np.linspace(0.0, 1.0, 80)
+    dots = (begin[:, None] + share[None, :, None] * (end - begin)[:, None]).reshape(-1, 3)
+    step = np.repeat(np.linalg.norm(end - begin, axis=1) / len(share), len(share))
+    wet = placed.to_space(dots)[:, 2] < -0.03
+    if not wet.any():
+        return None
+    low, high = dots[wet, :2].min(axis=0) - 0.2, dots[wet, :2].max(axis=0) + np.array([0.2, 0.0])
+    size = np.ceil((high - low) / PIXEL).astype(np.int64)
+    image = _image(dots[wet, :2], step[wet], low, size, BLUR / PIXEL)
+    image -= image.mean()
+    return _Picture(low, high, size, image / np.linalg.norm(image))
+
+
 def likeness(points: Float, scanner: Float, placed: PlacedLadder) -> float:
     """Return the similarity of points (n, 3) to a ladder below the water, seen square to its plane (-1 to 1).
 
@@ -314,23 +352,18 @@ def likeness(points: Float, scanner: Float, placed: PlacedLadder) -> float:
     points, scanner, placed
         In the local frame, with the water at zero.
     """
-    own = placed.to_ladder(points)
-    begin, end = placed.elements()
-    share = np.linspace(0.0, 1.0, 80)
-    dots = (begin[:, None] + share[None, :, None] * (end - begin)[:, None]).reshape(-1, 3)
-    step = np.repeat(np.linalg.norm(end - begin, axis=1) / len(share), len(share))
-    wet = placed.to_space(dots)[:, 2] < -0.03
-    if not wet.any():
+    picture = _picture(placed)
+    if picture is None:
         return -1.0
-    low, high = dots[wet, :2].min(axis=0) - 0.2, dots[wet, :2].max(axis=0) + np.array([0.2, 0.0])
-    mine = (np.abs(own[:, 2]) < 0.07) & (own[:, :2] > low).all(axis=1) & (own[:, :2] < high).all(axis=1)
+    across, up, out = placed.to_ladder(points).T
+    low, high = picture.low, picture.high
+    mine = (np.abs(out) < 0.07) & (across > low[0]) & (across < high[0]) & (up > low[1]) & (up < high[1])
     if mine.sum() < 50:
         return -1.0
-    size = np.ceil((high - low) / PIXEL).astype(int)
     weight = ((points[mine] - scanner) ** 2).sum(axis=1)
-    seen = _image(own[mine, :2], weight, low, size, 1.0)
-    expected = _image(dots[wet, :2], step[wet], low, size, BLUR / PIXEL)
-    return float(np.corrcoef(seen.ravel(), expected.ravel())[0, 1])
+    seen = _image(np.column_stack([across[mine], up[mine]]), weight, low, picture.size, 1.0)
+    seen -= seen.mean()
+    return float((seen * picture.image).sum() / np.linalg.norm(seen))
 
 
 def _image(places: Float, weight: Float, low: Float, size: Float, blur: float) -> Float:

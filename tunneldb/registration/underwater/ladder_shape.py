@@ -17,7 +17,7 @@ from tunneldb.registration.underwater.results import Ladder
 STILE_OVERHANG = 0.15  # m of the stiles beyond the outermost rungs: half a gap, since their ends are not given
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PlacedLadder:
     """Ladder with its position.
 
