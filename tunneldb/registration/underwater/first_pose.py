@@ -366,8 +366,8 @@ def likeness(points: Float, scanner: Float, placed: PlacedLadder) -> float:
     return float((seen * picture.image).sum() / np.linalg.norm(seen))
 
 
-def _image(places: Float, weight: Float, low: Float, size: Float, blur: float) -> Float:
+def _image(places: Float, weight: Float, low: Float, size: Int64, blur: float) -> Float:
     """Return the blurred square root of the density of weighted positions (n, 2), in pixels from ``low`` on."""
-    k = np.minimum(np.floor((places - low) / PIXEL).astype(np.int64), np.asarray(size) - 1)
+    k = np.minimum(np.floor((places - low) / PIXEL).astype(np.int64), size - 1)
     image = np.bincount(k[:, 0] * size[1] + k[:, 1], weights=weight, minlength=size[0] * size[1]).reshape(tuple(size))
     return np.asarray(np.sqrt(gaussian_filter(image, blur)))
