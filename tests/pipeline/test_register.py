@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import psycopg
@@ -50,11 +52,45 @@ def register(folder: Path, *more: object, code: int = 0, up: str = "+z", level: 
     return command("register", NAME, *files, *ladders, *more, code=code)
 
 
-def test_poses_are_told_stored_and_shown(canal: tuple[Path, list[Sonar]], conn: psycopg.Connection, tmp_path: Path) -> None:
+@dataclass(frozen=True)
+class Registered:
+    """Database in which both scans are registered, what the command told, and its report."""
+
+    name: str
+    told: dict[str, Any]
+    report: str
+
+
+@pytest.fixture(scope="module")
+def registered(copies: Copies, template: str, canal: tuple[Path, list[Sonar]]) -> Iterator[Registered]:
+    folder, _ = canal
+    told: list[str] = []
+    report = folder / "report.md"
+
+    def fill() -> None:
+        told.append(register(folder, "--json", "--report", report).stdout)
+
+    with copies.prepared(template, fill) as name:
+        yield Registered(name, json.loads(told[0]), report.read_text("utf-8"))
+
+
+@pytest.fixture
+def after(copies: Copies, registered: Registered) -> Iterator[psycopg.Connection]:
+    """Connection to a database in which both scans are registered; commands use it."""
+    with copies.connected(registered.name) as conn:
+        yield conn
+
+
+POINTS = "SELECT count(*), sum(ST_Z(geom)), sum(chainage) FROM tunnel.point"
+
+
+def test_poses_are_told_stored_and_shown(
+    canal: tuple[Path, list[Sonar]], conn: psycopg.Connection, registered: Registered, after: psycopg.Connection
+) -> None:
     folder, scans = canal
-    before = conn.execute("SELECT count(*), sum(ST_Z(geom)) FROM tunnel.point").fetchone()
-    conn.rollback()
-    told = json.loads(register(folder, "--json", "--report", tmp_path / "report.md").stdout)
+    before = conn.execute(POINTS).fetchone()
+    conn = after
+    told = registered.told
     assert [Path(scan["file"]).name for scan in told["scans"]] == ["s0.xyz", "s1.xyz"]
     for scan, true in zip(told["scans"], scans, strict=True):
         points = true.points[np.linalg.norm(true.points, axis=1) < 10.0][::50]
@@ -75,11 +111,10 @@ def test_poses_are_told_stored_and_shown(canal: tuple[Path, list[Sonar]], conn: 
     residuals = conn.execute("SELECT DISTINCT scan, kind FROM tunnel_api.registration_residual").fetchall()
     assert set(residuals) == {(name, kind) for name in ("s0.xyz", "s1.xyz") for kind in ("wall", "ladder", "waterline", "scan")}
     assert conn.execute("SELECT array_agg(name ORDER BY name) FROM tunnel_api.ladder").fetchone() == (["L0", "L1"],)
-    assert conn.execute("SELECT count(*), sum(ST_Z(geom)) FROM tunnel.point").fetchone() == before
+    assert conn.execute(POINTS).fetchone() == before
     conn.rollback()
-    report = (tmp_path / "report.md").read_text("utf-8")
-    assert "| s0.xyz | determined |" in report
-    assert "| L1 |" in report
+    assert "| s0.xyz | determined |" in registered.report
+    assert "| L1 |" in registered.report
     again = json.loads(register(folder, "--json").stdout)
     assert again["scans"] == told["scans"]
     assert conn.execute("SELECT count(*) FROM tunnel.sonar_scan").fetchone() == (2,)
@@ -89,19 +124,19 @@ def test_poses_are_told_stored_and_shown(canal: tuple[Path, list[Sonar]], conn: 
 
 
 def test_points_are_loaded_with_their_poses_and_the_bed_is_where_it_is(
-    canal: tuple[Path, list[Sonar]], conn: psycopg.Connection, tmp_path: Path
+    canal: tuple[Path, list[Sonar]], after: psycopg.Connection, tmp_path: Path
 ) -> None:
     folder, _ = canal
+    conn = after
     files = [folder / "s0.xyz", folder / "s1.xyz"]
-    before = conn.execute("SELECT count(*), sum(ST_Z(geom)), sum(chainage) FROM tunnel.point").fetchone()
+    before = conn.execute(POINTS).fetchone()
     conn.rollback()
-    register(folder)
     told = json.loads(command("load", NAME, *files, "--json").stdout)["files"]
     assert [(one["name"], one["state"]) for one in told] == [("s0.xyz", "loaded"), ("s1.xyz", "loaded")]
     for one in told:
         assert one["points"] == one["noise"] + one["outside"] + one["thinned"] + one["kept"]
         assert 0.02 < one["noise"] / one["points"] < 0.06  # 3 % are false
-    assert conn.execute("SELECT count(*), sum(ST_Z(geom)), sum(chainage) FROM tunnel.point").fetchone() == before
+    assert conn.execute(POINTS).fetchone() == before
     scene = Canal(77)
     rows = conn.execute("SELECT chainage, across, height, depth, sigma FROM tunnel_api.bed").fetchall()
     chainage, across, height, depth, sigma = np.array(rows).T
@@ -231,7 +266,7 @@ def test_possible_poses_are_listed_pictured_and_chosen(
 def test_soundings_in_the_tunnels_system_need_no_pose(
     canal: tuple[Path, list[Sonar]], conn: psycopg.Connection, tmp_path: Path
 ) -> None:
-    folder, scans = canal
+    _, scans = canal
     soundings = tmp_path / "soundings.xyz"
     points = np.vstack([scan.to_tunnel(scan.points[np.linalg.norm(scan.points, axis=1) < 10.0]) for scan in scans])
     np.savetxt(soundings, points, "%.4f")
@@ -255,6 +290,10 @@ def test_soundings_in_the_tunnels_system_need_no_pose(
     assert "2 values, expected x, y and z" in command("load", NAME, soundings, *how, code=2).stderr
     np.savetxt(soundings, points + np.array([5000.0, 0.0, 0.0]), "%.4f")
     assert "is along the axis" in command("load", NAME, soundings, *how, code=2).stderr
-    register(folder)
-    named = command("load", NAME, folder / "s0.xyz", *how, code=2).stderr
-    assert "has been registered" in named
+
+
+@pytest.mark.usefixtures("after")
+def test_a_registered_scan_is_not_loaded_as_soundings(canal: tuple[Path, list[Sonar]]) -> None:
+    folder, _ = canal
+    how = ["--medium", "water", "--water-level", LEVEL]
+    assert "has been registered" in command("load", NAME, folder / "s0.xyz", *how, code=2).stderr

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.fft import irfft2, next_fast_len, rfft2
-from scipy.ndimage import gaussian_filter, maximum_filter
+from scipy.ndimage import gaussian_filter
 
 from tunneldb.arrays import Bool, Float, Single
 from tunneldb.registration.underwater.first_pose import LevelScan
@@ -162,12 +162,30 @@ def _in_tile(cells: PlanCells, tile: Profile, cloud: SonarCloud) -> list[PlanPos
         score = 0.5 * np.asarray(score)
         if cloud.near is not None:
             score = np.where(_within(cloud.near, low - own_low, shape, score.shape), score, -np.inf)
-        top = np.flatnonzero((score == maximum_filter(score, int(2 * PEAK_DISTANCE / PIXEL) + 1, mode="wrap")).ravel())
-        top = top[np.isfinite(score.ravel()[top])]
-        for k in top[np.argsort(-score.ravel()[top])][:PEAKS_OF_HEADING]:
-            i, j = np.unravel_index(int(k), score.shape)
+        for i, j in _peaks(score, PEAKS_OF_HEADING):
             shift = np.array([i if i < shape[0] else i - size[0], j if j < shape[1] else j - size[1]]) * PIXEL
             out.append(PlanPose(float(heading), low + shift - own_low, float(score[i, j])))
+    return out
+
+
+def _peaks(score: Single, most: int) -> list[tuple[int, int]]:
+    """Return row and column of the highest maxima, the highest first, PEAK_DISTANCE apart; the image repeats itself."""
+    reach = round(PEAK_DISTANCE / PIXEL)
+    side = reach + 1  # a maximum is the greatest value of a block that is no larger than its reach
+    blocks = np.pad(score, [(0, -n % side) for n in score.shape], constant_values=-np.inf)
+    blocks = np.maximum.reduce([blocks[k::side] for k in range(side)])
+    blocks = np.maximum.reduce([blocks[:, k::side] for k in range(side)])
+    out: list[tuple[int, int]] = []
+    for k in np.argsort(-blocks, axis=None):
+        row, column = np.unravel_index(int(k), blocks.shape)
+        highest = blocks[row, column]
+        if len(out) == most or not np.isfinite(highest):
+            break
+        block = score[row * side : (row + 1) * side, column * side : (column + 1) * side]
+        i, j = np.argwhere(block == highest)[0] + np.array([row, column]) * side
+        around = [np.arange(at - reach, at + reach + 1) % n for at, n in zip((i, j), score.shape, strict=True)]
+        if score[np.ix_(*around)].max() == highest:
+            out.append((int(i), int(j)))
     return out
 
 
