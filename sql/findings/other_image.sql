@@ -26,3 +26,7 @@ SELECT v.finding_id, v.outline_key,
  GROUP BY v.finding_id, v.outline_key;
 COMMENT ON VIEW tunnel_internal.other_images IS
     'Differences of outlines from the lining around them in other images: in words, and the greatest in standard deviations of the lining';
+COMMENT ON COLUMN tunnel_internal.other_images.finding_id IS 'Finding';
+COMMENT ON COLUMN tunnel_internal.other_images.outline_key IS 'Key of the outline that was measured';
+COMMENT ON COLUMN tunnel_internal.other_images.words IS 'Differences in words, the image in colour first, then by name';
+COMMENT ON COLUMN tunnel_internal.other_images.contrast IS 'Greatest difference in standard deviations of the lining around it';
