@@ -6,6 +6,7 @@ installed once a session (see support/databases.py). With pytest-xdist each work
 
 from __future__ import annotations
 
+import gc
 import shutil
 import signal
 import tempfile
@@ -35,6 +36,8 @@ TEST_SETTINGS = {
     "shared_buffers": "128MB",
     "max_wal_size": "256MB",
 } | DATABASES
+
+gc.set_threshold(100_000, 50, 1000)  # what tests make is soon gone by itself: looking for it took a twentieth of their time
 
 # What a script runs in the background has Ctrl-C ignored, and so would all that tests start.
 signal.signal(signal.SIGINT, signal.default_int_handler)
