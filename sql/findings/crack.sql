@@ -4,7 +4,7 @@
 CREATE OR REPLACE FUNCTION tunnel_internal.crack_search_entry(source text, area geometry) RETURNS jsonb
 LANGUAGE sql IMMUTABLE STRICT PARALLEL SAFE SET search_path = pg_catalog, pg_temp
 RETURN jsonb_build_object('source', source, 'chainage_from', public.ST_XMin(area), 'chainage_to', public.ST_XMax(area),
-                          'area', public.ST_Area(area));
+                          'arc_from', public.ST_YMin(area), 'arc_to', public.ST_YMax(area));
 COMMENT ON FUNCTION tunnel_internal.crack_search_entry(text, geometry) IS 'A record of crack_search as the audit has it';
 
 CREATE OR REPLACE FUNCTION tunnel_api.crack_search_add(survey text, area geometry, source text) RETURNS int
@@ -65,7 +65,7 @@ COMMENT ON FUNCTION tunnel_api.crack_search_remove(int) IS
 
 CREATE OR REPLACE VIEW tunnel_api.crack_search AS
 SELECT c.id, c.survey_id, s.name AS survey, c.source, public.ST_XMin(c.area) AS chainage_from, public.ST_XMax(c.area) AS chainage_to,
-       public.ST_YMin(c.area) AS arc_from, public.ST_YMax(c.area) AS arc_to, public.ST_Area(c.area) AS area, c.recorded_by, c.recorded_at
+       public.ST_YMin(c.area) AS arc_from, public.ST_YMax(c.area) AS arc_to, c.recorded_by, c.recorded_at
   FROM tunnel.crack_search c JOIN tunnel.survey s ON s.id = c.survey_id;
 COMMENT ON VIEW tunnel_api.crack_search IS
     'Parts of the lining that were searched for cracks, recorded by tunneldb findings searched and findings trace. Elsewhere it is not known that there are no cracks';
@@ -73,7 +73,6 @@ COMMENT ON COLUMN tunnel_api.crack_search.chainage_from IS 'Least chainage, m';
 COMMENT ON COLUMN tunnel_api.crack_search.chainage_to IS 'Greatest chainage, m';
 COMMENT ON COLUMN tunnel_api.crack_search.arc_from IS 'Least arc, m, positive right looking up-chainage';
 COMMENT ON COLUMN tunnel_api.crack_search.arc_to IS 'Greatest arc, m';
-COMMENT ON COLUMN tunnel_api.crack_search.area IS 'Area in the unrolled plane, m²';
 
 -- The lining is the length of the element times the girth of its sections, without the ground, searched for leaks or not: cracks can
 -- come from photos of a survey without detection.

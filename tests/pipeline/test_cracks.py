@@ -348,12 +348,13 @@ def test_a_mask_traced_twice_adds_nothing(conn: psycopg.Connection, example: str
     path = write_png(tmp_path / "mask.png", mask(DRAWN, WIDTH, PLACE, 2800, 1500))
     points = control(tmp_path / "points.csv", 2800, 1500)
     first = told("findings", "trace", NAME, path, "--points", points)
-    # the strip of 14 m by 7.5 m lies within the lining
-    assert first["searched"] == pytest.approx(14.0 * 7.5, rel=0.005)
+    # the strip is 14 m by 7.5 m, and lies within the lining
+    corners = [first["searched"][name] for name in ("chainage_from", "chainage_to", "arc_from", "arc_to")]
+    assert corners == pytest.approx([12312.05, 12326.05, -3.45, 4.05], abs=0.02)
     again = told("findings", "trace", NAME, path, "--points", points)
     assert (again["ids"], again["repeated"], again["searched"]) == ([], 3, first["searched"])
     assert len(cracks(conn)) == 3
-    assert [row["area"] for row in told("findings", "searched", NAME)["searches"]] == [first["searched"]]
+    assert told("findings", "searched", NAME)["searches"] == [first["searched"]]
 
 
 def densities(name: str) -> dict[float, tuple[float, float | None]]:
@@ -399,6 +400,8 @@ def test_a_wrong_search_is_one_line(example: str) -> None:
         (["--from", "12315"], "need --source TEXT"),
         (["--source", "x", "--remove", "1"], "exclude each other"),
         (["--remove", "9"], "has no search with number 9"),
+        (["--source", ""], "it is not said what was searched"),
+        (["--source", "x" * 1001], "has 1001 characters"),
         (["--from", "99000", "--source", "x"], "lies beside this stretch"),
     ):
         assert message in refused("findings", "searched", NAME, *options), options

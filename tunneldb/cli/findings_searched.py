@@ -66,13 +66,13 @@ def searched(
         click.echo(f"{survey}: it is not recorded that any part was searched for cracks")
         return
     print_table(
-        ["id", "from m", "to m", "arc from m", "arc to m", "area m²", "source", "by", "at"],
+        ["id", "from m", "to m", "arc from m", "arc to m", "source", "by", "at"],
         [
             [
                 row.id, f"{row.chainage_from:.2f}", f"{row.chainage_to:.2f}", f"{row.arc_from:.2f}", f"{row.arc_to:.2f}",
-                f"{row.area:.1f}", row.source, row.recorded_by, f"{row.recorded_at:%Y-%m-%d %H:%M}",
+                row.source, row.recorded_by, f"{row.recorded_at:%Y-%m-%d %H:%M}",
             ]
             for row in rows
         ],
-        right=range(6),
+        right=range(5),
     )  # fmt: skip

@@ -66,5 +66,5 @@ def trace(settings: Settings, survey: str, file: Path, points: Path | None, band
     size = f", mask {min(widths):.1f} to {max(widths):.1f} mm wide" if widths else ""
     click.echo(
         f"{survey}: {counted(len(done.ids), 'crack')} traced, {sum(line.length for line in done.lines):.2f} m{size}; searched:"
-        f" {done.searched:.1f} m²"
+        f" {done.searched.chainage_from:.2f} to {done.searched.chainage_to:.2f} m"
     )

@@ -24,7 +24,7 @@ from tunneldb.raster.placement.resample import Frame, Source
 from tunneldb.raster.tracing.joining import TracedLine, join_images
 from tunneldb.raster.tracing.lines import trace
 from tunneldb.raster.tracing.thinning import thin
-from tunneldb.store.crack_search import add_crack_search
+from tunneldb.store.crack_search import CrackSearch, add_crack_search
 from tunneldb.store.imported_images import section_extent
 from tunneldb.store.survey import Survey
 
@@ -67,8 +67,8 @@ class TracedResult:
         Number of pieces that are shorter than the minimum, and their length, m.
     wide, beyond, repeated : int
         Number of areas that are too wide for a crack, of lines beyond the lining, and of cracks that the survey has already.
-    searched : float
-        Area of the masks on the lining, m².
+    searched : CrackSearch
+        Area of the masks on the lining.
     warnings, notes : list of str
         Of the placement.
     points : list of ControlPoint
@@ -81,7 +81,7 @@ class TracedResult:
     wide: int
     beyond: int
     repeated: int
-    searched: float
+    searched: CrackSearch
     warnings: list[str]
     notes: list[str]
     points: list[ControlPoint]

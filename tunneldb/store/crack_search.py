@@ -12,6 +12,7 @@ from psycopg import sql
 from psycopg.rows import class_row
 from shapely.geometry.base import BaseGeometry
 
+from tunneldb.errors import UserError
 from tunneldb.store.survey import Survey
 
 TOLERANCE = 0.01
@@ -29,8 +30,6 @@ class CrackSearch:
         What was searched.
     chainage_from, chainage_to, arc_from, arc_to : float
         Extent in the unrolled plane, m.
-    area : float
-        Area, m².
     recorded_by : str
     recorded_at : datetime
     """
@@ -41,25 +40,26 @@ class CrackSearch:
     chainage_to: float
     arc_from: float
     arc_to: float
-    area: float
     recorded_by: str
     recorded_at: dt.datetime
 
 
-def add_crack_search(conn: psycopg.Connection[Any], survey: Survey, area: BaseGeometry, source: str) -> float:
-    """Record that an area of the unrolled plane was searched for cracks, once; return its area on the lining, m².
+def add_crack_search(conn: psycopg.Connection[Any], survey: Survey, area: BaseGeometry, source: str) -> CrackSearch:
+    """Record that an area of the unrolled plane was searched for cracks, once; return what is recorded.
 
     Raises
     ------
-    psycopg.errors.InvalidParameterValue
-        If it does not meet the lining.
+    UserError
+        If the area does not meet the lining, or the source is empty or too long.
     """
     query = "SELECT tunnel_api.crack_search_add(%s, public.ST_GeomFromWKB(%s), %s)"
-    key = conn.execute(query, [survey.name, shapely.to_wkb(shapely.simplify(area, TOLERANCE)), source]).fetchone()
+    try:
+        key = conn.execute(query, [survey.name, shapely.to_wkb(shapely.simplify(area, TOLERANCE)), source]).fetchone()
+    except psycopg.DataError as error:
+        hint = f"; {error.diag.message_hint}" if error.diag.message_hint else ""
+        raise UserError(f"{error.diag.message_primary}{hint}") from None
     assert key is not None
-    found = conn.execute("SELECT area FROM tunnel_api.crack_search WHERE id = %s", key).fetchone()
-    assert found is not None
-    return float(found[0])
+    return next(one for one in read_crack_searches(conn, survey) if one.id == key[0])
 
 
 def read_crack_searches(conn: psycopg.Connection[Any], survey: Survey) -> list[CrackSearch]:
