@@ -20,13 +20,13 @@ _troubles: dict[Page, list[str]] = {}
 
 
 def enter(context: BrowserContext, user: str, password: str) -> None:
-    """Sign in by the form."""
+    """Sign in with what the form would send, without a page."""
     context.set_default_timeout(PATIENCE)
-    page = context.new_page()
-    page.goto("/login")
-    sign_in(page, user, password)
-    expect(page.get_by_role("heading", name="Surveys")).to_be_visible()
-    page.close()
+    form = context.request.get("/login").text()
+    token = form.partition('name="csrf" value="')[2].partition('"')[0]
+    answer = context.request.post("/login", form={"user": user, "password": password, "csrf": token})
+    assert answer.ok, answer.text()
+    assert not answer.url.endswith("/login")
 
 
 def sign_in(page: Page, user: str, password: str) -> None:
