@@ -377,8 +377,8 @@ def test_a_download_is_cancelled_and_resumed(tablets: Tablets) -> None:
         (("13+000", "13+100"), "The survey reaches"),
     ],
 )
-def test_wrong_stretches_get_one_line(tablets: Tablets, stretch: tuple[str, str], said: str) -> None:
-    with opened(tablets(), VIEW) as page:
+def test_wrong_stretches_get_one_line(ines_context: BrowserContext, stretch: tuple[str, str], said: str) -> None:
+    with opened(ines_context, VIEW) as page:
         panel = tab(page, "Offline")
         panel.get_by_label("From", exact=True).fill(stretch[0])
         panel.get_by_label("To", exact=True).fill(stretch[1])
