@@ -16,6 +16,8 @@ PATIENCE = 30_000
 
 expect.set_options(timeout=PATIENCE)
 
+AXE = Axe()
+
 _troubles: dict[Page, list[str]] = {}
 
 
@@ -110,7 +112,9 @@ def comes_to(page: Page, fits: Callable[[dict[str, float]], object]) -> dict[str
 
 def accessibility_findings(page: Page) -> list[str]:
     """Return the serious and critical findings of axe."""
-    found = Axe().run(page, options={"resultTypes": ["violations"]}).response["violations"]
+    if not page.evaluate("'axe' in window"):
+        page.evaluate(AXE.axe_script)
+    found = page.evaluate("axe.run(document, { resultTypes: ['violations'] }).then(({ violations }) => violations)")
     return [
         f"{one['id']}: {one['help']}: {[node['target'] for node in one['nodes']][:3]}"
         for one in found
