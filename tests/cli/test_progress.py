@@ -15,6 +15,7 @@ import psycopg
 import pytest
 from click.testing import CliRunner
 from pyproj import CRS
+from support.command import command
 from support.loaded_survey import SURVEY, add_survey, tube, write
 
 from tunneldb.cli.main import main
@@ -78,7 +79,7 @@ def test_a_bar_shows_rate_and_time_left_and_leaves_the_pipe_to_results(survey: P
 
 
 def test_lines_are_printed_above_the_bar_and_not_into_it(survey: Path) -> None:
-    on_a_terminal("load", SURVEY, survey)
+    command("load", SURVEY, survey)
     shown, _ = on_a_terminal("run", SURVEY, "--to", "segments", output_too=True)
     for line in (r"\[1/2\] axis km 1: vertices: ", r"\[2/2\] segments km 1: [0-9]+ segments? with"):
         assert re.search(rf"(^|[\r\n]){line}", shown)
@@ -86,7 +87,7 @@ def test_lines_are_printed_above_the_bar_and_not_into_it(survey: Path) -> None:
 
 
 def test_the_bar_of_simulate_shows_the_time_left(tmp_path: Path) -> None:
-    shown, output = on_a_terminal("simulate", tmp_path, "--preset", "small", "--density", 1500, "--no-truth")  # some blocks
+    shown, output = on_a_terminal("simulate", tmp_path, "--preset", "small", "--density", 900, "--no-truth")  # three blocks
     assert re.search(r"scanning .*[0-9] (million )?points/s [0-9]+:[0-9]{2}:[0-9]{2} left", shown)
     assert re.search(r"^[0-9,]+ points, ", output)
 

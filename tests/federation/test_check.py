@@ -29,9 +29,9 @@ SECRET = "Geheim-4711"
 COUNT = "SELECT server, count(*) FROM tunnel_hub.tunnel GROUP BY server ORDER BY server"
 
 
-@pytest.fixture
-def west() -> Iterator[tuple[Server, str]]:
-    """A server of its own with one tunnel, and its DSN for the hub."""
+@pytest.fixture(scope="module")
+def own_server() -> Iterator[tuple[Server, str]]:
+    """A server beside that of the tests with one tunnel, and its DSN for the hub."""
     home = Path(tempfile.mkdtemp(prefix="tunneldb-west-"))
     server = Server(home, {"fsync": "off", "shared_buffers": "32MB"})
     try:
@@ -49,21 +49,43 @@ def west() -> Iterator[tuple[Server, str]]:
         shutil.rmtree(home)
 
 
-def test_a_password_comes_from_a_file_of_the_hub(federation: Federation, west: tuple[Server, str], server_dsn: str) -> None:
+@pytest.fixture
+def west(own_server: tuple[Server, str]) -> tuple[Server, str]:
+    """That server, running, whatever another test did to it."""
+    own_server[0].start()
+    return own_server
+
+
+@pytest.fixture
+def asking(west: tuple[Server, str]) -> Iterator[Server]:
+    """That server, while it asks the reader for the password SECRET."""
     server, dsn = west
     home = server.home()
-    rules, passwords = home.state / "rules.conf", Path(server_dsn.partition("host=")[2].split()[0]) / "passwords"
+    rules = home.state / "rules.conf"
     rules.write_text(f"local all {READER} scram-sha-256\nlocal all all trust\n")
+    rules.chmod(0o600)
+    if home.user is not None:
+        os.chown(rules, home.user.pw_uid, home.user.pw_gid)
     with psycopg.connect(make_conninfo(dsn, user=getpass.getuser()), autocommit=True) as owner:
         owner.execute(f"ALTER ROLE {READER} PASSWORD '{SECRET}'".encode())
         owner.execute(sql.SQL("ALTER SYSTEM SET hba_file = {}").format(sql.Literal(str(rules))))
-    for path in (rules, passwords):
-        path.touch(0o600)
-        if home.user is not None:
-            os.chown(path, home.user.pw_uid, home.user.pw_gid)
     server.stop()
     server.start()
-    target = make_conninfo(dsn, passfile=str(passwords))
+    yield server
+    with psycopg.connect(make_conninfo(dsn, user=getpass.getuser()), autocommit=True) as owner:
+        owner.execute("ALTER SYSTEM RESET hba_file")
+    server.stop()
+
+
+def test_a_password_comes_from_a_file_of_the_hub(
+    federation: Federation, west: tuple[Server, str], asking: Server, server_dsn: str
+) -> None:
+    home = asking.home()
+    passwords = Path(server_dsn.partition("host=")[2].split()[0]) / "passwords"
+    passwords.touch(0o600)
+    if home.user is not None:
+        os.chown(passwords, home.user.pw_uid, home.user.pw_gid)
+    target = make_conninfo(west[1], passfile=str(passwords))
     assert "no password supplied" in federation.federate("add", "west", "--dsn", target, code=2)
     passwords.write_text(f"*:*:*:{READER}:{SECRET}\n")
     federation.federate("add", "west", "--dsn", target)

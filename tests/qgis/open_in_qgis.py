@@ -4,6 +4,7 @@ Usage: open_in_qgis.py PROJECT describe | render THEME PNG | move_vertex N DX DZ
        | draw KIND | draw_findings | write_action | results LAYER | add VIEW
        | draw_layer LAYER XMIN,YMIN,XMAX,YMAX PNG | numbers LAYER
        | atlas PDF [LAYOUT] | preview | where CHAINAGE ARC | labels LAYER | space [PNG]
+       | serve
 """
 
 from __future__ import annotations
@@ -138,6 +139,7 @@ def atlas(project: QgsProject, path: str, name: str = "Inspection sheets") -> di
 def preview(project: QgsProject) -> dict[str, Any]:
     """Scale of the strip of each sheet as the layout designer previews them: it has scales to choose from."""
     layout = project.layoutManager().layoutByName("Inspection sheets")
+    own = layout.renderContext().predefinedScales()
     layout.renderContext().setPredefinedScales([500.0, 1000.0, 2500.0])
     sheets, strip = layout.atlas(), layout.itemById("strip")
     sheets.beginRender()
@@ -145,6 +147,8 @@ def preview(project: QgsProject) -> dict[str, Any]:
     while sheets.next():
         layout.reportContext().setLayer(sheets.coverageLayer())
         scales.append(round(strip.scale()))
+    sheets.endRender()
+    layout.renderContext().setPredefinedScales(own)
     return {"scales": scales}
 
 
@@ -396,8 +400,21 @@ def _commit(layer: QgsVectorLayer) -> dict[str, Any]:
     return {"saved": saved, "errors": layer.commitErrors()}
 
 
+def run(project: QgsProject, canvas: QgsMapCanvas, action: str, *arguments: str) -> dict[str, Any]:
+    """Run one action."""
+    return describe(project, canvas) if action == "describe" else globals()[action](project, *arguments)
+
+
+def serve(project: QgsProject, canvas: QgsMapCanvas) -> None:
+    """Run actions, a list of words a line, until the input ends; print a line for each, and what QGIS prints on the errors."""
+    with os.fdopen(os.dup(1), "w") as answers:
+        os.dup2(2, 1)
+        for line in sys.stdin:
+            print(json.dumps(run(project, canvas, *json.loads(line))), file=answers, flush=True)
+
+
 def main() -> None:
-    """Run one action and print its result."""
+    """Run one action, or those that are asked for, and print what comes of it."""
     application = QgsApplication([], True)
     application.initQgis()
     Qgs3D.initialize()
@@ -406,9 +423,10 @@ def main() -> None:
     canvas.setObjectName("Unrolled")
     project.readProject.connect(canvas.readProject)
     assert project.read(sys.argv[1]), project.error()
-    action, arguments = sys.argv[2], sys.argv[3:]
-    result = describe(project, canvas) if action == "describe" else globals()[action](project, *arguments)
-    print(json.dumps(result))
+    if sys.argv[2] == "serve":
+        serve(project, canvas)
+    else:
+        print(json.dumps(run(project, canvas, *sys.argv[2:])))
     project.clear()
     sys.stdout.flush()
     # Leaving the interpreter normally makes QGIS crash now and then in its own destructors.

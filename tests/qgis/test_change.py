@@ -10,7 +10,7 @@ import pytest
 import rasterio
 from click.testing import CliRunner
 from support.example_change import EARLIER, IMAGE, LEAKS, REGIONS, add_earlier
-from support.qgis import act
+from support.qgis import opened
 
 from tunneldb.cli.main import main
 
@@ -41,7 +41,9 @@ def write(survey: str, path: Path) -> None:
 def test_layers_of_change_are_drawn_and_labelled(compared: str, tmp_path: Path) -> None:
     path = tmp_path / "demo.qgs"
     write(compared, path)
-    seen = act(path, "describe")
+    with opened(path) as look:
+        seen = look("describe")
+        regions, leaks = look("labels", "change_region_unrolled"), look("labels", "leak_change_unrolled")
     for name, kind in (REGION | LEAK).items():
         layer = seen["layers"][name]
         rows = len(REGIONS) if name in REGION else len(LEAKS)
@@ -56,11 +58,9 @@ def test_layers_of_change_are_drawn_and_labelled(compared: str, tmp_path: Path) 
     assert themes["Change on the map"] == {"change_region_map", "leak_change_map", "axis", "outline"}
     assert "change_region_3d" in themes["3D"]
     assert not {*REGION, *LEAK, PICTURE} & (themes["Map"] | themes["Unrolled"])
-    told = act(path, "labels", "change_region_unrolled")
-    assert (sorted(told["texts"]), told["error"]) == (["+4.0 mm", "-6.0 mm"], "")
-    told = act(path, "labels", "leak_change_unrolled")
-    assert any(text.endswith("grown\n1.00 → 3.00 m²") for text in told["texts"]), told
-    assert any(text.endswith("dry again\n0.30 → 0.00 m²") for text in told["texts"]), told
+    assert (sorted(regions["texts"]), regions["error"]) == (["+4.0 mm", "-6.0 mm"], "")
+    assert any(text.endswith("grown\n1.00 → 3.00 m²") for text in leaks["texts"]), leaks
+    assert any(text.endswith("dry again\n0.30 → 0.00 m²") for text in leaks["texts"]), leaks
 
 
 def test_image_and_layers_are_there_where_there_are_rows(conn: psycopg.Connection, compared: str, tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from PIL import Image
 from support.example_survey import NAME
 from support.imported_image import SPOTS, STATED, strip, write
-from support.qgis import act
+from support.qgis import opened
 
 from tunneldb.cli.main import main
 
@@ -42,20 +42,17 @@ def test_imported_images_are_layers(conn: psycopg.Connection, example: str, tmp_
     assert (
         'type="multibandcolor"' in text.split("<id>tunneldb_layer_demo-2024-km012-imported-photo</id>")[1].split("</pipe>")[0]
     )
-    seen = act(tmp_path / "demo.qgs", "describe")
+    # 1 m by 1 m around each hot spot, which is bright in its middle and dark at the edges
+    pictures = []
+    with opened(tmp_path / "demo.qgs") as look:
+        seen = look("describe")
+        for n, (x, y) in enumerate(SPOTS[::2]):
+            pictures.append(tmp_path / f"spot-{n}.png")
+            box = f"{x - 0.5},{y - 0.5},{x + 0.5},{y + 0.5}"
+            assert look("draw_layer", "demo-2024-km012-imported-raw", box, str(pictures[-1]))["errors"] == []
     for name in ("raw", "photo"):
         assert seen["layers"][f"demo-2024-km012-imported-{name}"]["valid"]
-    # 1 m by 1 m around each hot spot, which is bright in its middle and dark at the edges
-    for x, y in SPOTS[::2]:
-        picture = tmp_path / "spot.png"
-        told = act(
-            tmp_path / "demo.qgs",
-            "draw_layer",
-            "demo-2024-km012-imported-raw",
-            f"{x - 0.5},{y - 0.5},{x + 0.5},{y + 0.5}",
-            str(picture),
-        )
-        assert told["errors"] == []
+    for picture in pictures:
         shown = np.asarray(Image.open(picture).convert("RGB")).astype(int)
         rows, columns = shown.shape[:2]
         assert shown[rows // 2, columns // 2, 0] > 200

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
-import unicodedata
 import warnings
 import zipfile
 from collections.abc import Iterator
@@ -14,7 +13,6 @@ from typing import Any
 
 import numpy as np
 import psycopg
-import pypdf
 import pytest
 import rasterio
 from click.testing import CliRunner, Result
@@ -24,7 +22,8 @@ from psycopg.conninfo import make_conninfo
 from rasterio.errors import NotGeoreferencedWarning
 from support.coloured_image import ABOVE, BELOW, add_image_in_colour
 from support.example_survey import LEAKS, example_surface, thin_images, without_intensity
-from support.qgis import ENVIRONMENT, PYTHON, SCRIPT, act
+from support.pdf import words
+from support.qgis import ENVIRONMENT, PYTHON, SCRIPT, Look, act, opened
 from support.system import missing
 
 from tunneldb.classification.classes import PointClass
@@ -103,9 +102,16 @@ def shared(shared_dsn: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def seen(shared: Path) -> dict[str, Any]:
+def look(shared: Path) -> Iterator[Look]:
+    """Function that looks at it in a QGIS in which it is open, and changes nothing."""
+    with opened(shared) as look:
+        yield look
+
+
+@pytest.fixture(scope="module")
+def seen(look: Look) -> dict[str, Any]:
     """What QGIS sees of it."""
-    return act(shared, "describe")
+    return look("describe")
 
 
 @pytest.fixture
@@ -237,9 +243,9 @@ def test_themes_and_views(seen: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize("theme", ["Map", "Unrolled"])
-def test_themes_are_drawn(shared: Path, tmp_path: Path, theme: str) -> None:
+def test_themes_are_drawn(look: Look, tmp_path: Path, theme: str) -> None:
     picture = tmp_path / f"{theme}.png"
-    assert act(shared, "render", theme, str(picture)) == {"saved": True, "errors": []}
+    assert look("render", theme, str(picture)) == {"saved": True, "errors": []}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", NotGeoreferencedWarning)
         image = rasterio.open(picture)
@@ -257,14 +263,14 @@ def test_themes_are_drawn(shared: Path, tmp_path: Path, theme: str) -> None:
         assert rows[-1] - rows[0] > 0.4 * inked.shape[0], "the lining"
 
 
-def test_states_are_named_and_drawn_in_their_colours(shared: Path, seen: dict[str, Any], tmp_path: Path) -> None:
+def test_states_are_named_and_drawn_in_their_colours(look: Look, seen: dict[str, Any], tmp_path: Path) -> None:
     entries = PALETTES["state"].entries
     legend = [[code, name, hexadecimal(colour)] for code, (name, colour) in entries.items()]
     assert seen["layers"]["demo-2024-km012-state"]["legend"] == legend
     assert [name for _, name, _ in legend] == ["unseen", "lining", "recess", "appendage", "floor", "dark", "submerged"]
     picture = tmp_path / "state.png"
     # 160 m along the tunnel by 64 m across in 1600 × 640 pixels: one of the image is one of the picture
-    assert act(shared, "draw_layer", "demo-2024-km012-state", "12300,-32,12460,32", str(picture))["saved"]
+    assert look("draw_layer", "demo-2024-km012-state", "12300,-32,12460,32", str(picture))["saved"]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", NotGeoreferencedWarning)
         image = rasterio.open(picture)
@@ -280,12 +286,12 @@ def test_states_are_named_and_drawn_in_their_colours(shared: Path, seen: dict[st
     assert area["dark"] > 5
 
 
-def test_classes_are_named_and_drawn_in_their_colours(shared: Path, seen: dict[str, Any], tmp_path: Path) -> None:
+def test_classes_are_named_and_drawn_in_their_colours(look: Look, seen: dict[str, Any], tmp_path: Path) -> None:
     legend = {klass: (klass.name.lower(), hexadecimal(colour)) for klass, colour in COLOURS.items()}
     assert seen["layers"]["demo-2024-km012-class"]["legend"] == [[int(k), name, colour] for k, (name, colour) in legend.items()]
     picture = tmp_path / "class.png"
     # 160 m along the tunnel by 64 m across in 1600 × 640 pixels: one of the image is one of the picture
-    assert act(shared, "draw_layer", "demo-2024-km012-class", "12320,-32,12480,32", str(picture))["saved"]
+    assert look("draw_layer", "demo-2024-km012-class", "12320,-32,12480,32", str(picture))["saved"]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", NotGeoreferencedWarning)
         image = rasterio.open(picture)
@@ -300,20 +306,15 @@ def test_classes_are_named_and_drawn_in_their_colours(shared: Path, seen: dict[s
 
 
 @pytest.fixture(scope="module")
-def sheets(shared: Path) -> Path:
+def sheets(shared: Path, look: Look) -> Path:
     """The inspection sheets, printed."""
     path = shared.with_name("sheets.pdf")
-    assert act(shared, "atlas", str(path)) == {"saved": True, "error": "", "sheets": 4}
+    assert look("atlas", str(path)) == {"saved": True, "error": "", "sheets": 4}
     return path
 
 
-def words(path: Path) -> list[str]:
-    """The text of each page."""
-    return [" ".join(unicodedata.normalize("NFKC", page.extract_text()).split()) for page in pypdf.PdfReader(path).pages]
-
-
-def test_sheets_keep_their_scale_in_the_preview(shared: Path) -> None:
-    assert act(shared, "preview") == {"scales": [200] * 4}
+def test_sheets_keep_their_scale_in_the_preview(look: Look) -> None:
+    assert look("preview") == {"scales": [200] * 4}
 
 
 def test_a_sheet_is_printed_for_each_50_m(sheets: Path) -> None:
@@ -338,8 +339,9 @@ def test_a_sheet_lists_its_leaks_and_no_others(sheets: Path) -> None:
 def test_the_sheet_writes_the_clock_as_the_list_of_leaks_does(rows: psycopg.Connection, sheets: Path) -> None:
     stated = rows.execute("SELECT label, clock FROM tunnel_api.leak WHERE counted").fetchall()
     assert len(stated) > 3
+    pages = words(sheets)
     for label, clock in stated:
-        (page,) = [page for page in words(sheets) if label in page]
+        (page,) = [page for page in pages if label in page]
         assert clock_label(clock) in page.split(label)[1][:16], label
 
 
@@ -421,7 +423,9 @@ def test_a_sheet_lists_findings_by_kind_and_each_in_one_table(conn: psycopg.Conn
     drip = draw(conn, "drip", "POINT(12390 1)", severity=3)
     draw(conn, "crack", "LINESTRING(12385 3, 12387 3)", review="rejected")
     conn.commit()
-    act(project, "atlas", str(tmp_path / "findings.pdf"))
+    with opened(project) as look:
+        look("atlas", str(tmp_path / "findings.pdf"))
+        drawn = {name: look("numbers", name)["numbers"] for name in ON_SHEETS}
     page = words(tmp_path / "findings.pdf")[1]
     leaks, _, findings = page.partition("Size Severity State Remark")
     # 1 m of arc is 0.25 of 4 m of radius: 29 minutes. The tunnel bends to the right by 1 / 300 m: there lengths are 0.3 % less
@@ -438,7 +442,6 @@ def test_a_sheet_lists_findings_by_kind_and_each_in_one_table(conn: psycopg.Conn
     assert str(drip) not in findings.split("Inspected by")[0].split(listed[2])[0]
     assert "other findings 3" in page
     assert "Not counted and not drawn: 1 rejected" in page
-    drawn = {name: act(project, "numbers", name)["numbers"] for name in ON_SHEETS}
     assert drawn == {"finding_point_sheet": [bolt, drip], "finding_line_sheet": [crack], "finding_area_sheet": [spall]}
 
 
@@ -486,8 +489,8 @@ def test_findings_are_drawn_with_what_the_form_begins_with(conn: psycopg.Connect
         assert done[f"finding_{name}_unrolled"]["photos"] == ["Photos (table)"]
 
 
-def test_3d_view_looks_at_the_largest_leak(shared: Path) -> None:
-    seen = act(shared, "space")
+def test_3d_view_looks_at_the_largest_leak(look: Look) -> None:
+    seen = look("space")
     assert (seen["name"], seen["crs"]) == ("3D", "EPSG:25830")
     assert seen["open"] == "0", "QGIS 3.24 and later open it when asked to"
     assert set(seen["layers"]) == {"axis", "section", "leak_3d", "target_sphere", "ground", "clearance_infringement_3d"}
@@ -556,8 +559,8 @@ def test_3d_view_shows_leaks_on_the_lining_in_their_colours(shared: Path, tmp_pa
         assert (pixels == np.array(colour)[:, None, None]).all(axis=0).sum() > 500, "axis, sections and ground"
 
 
-def test_place_on_the_image_is_told(rows: psycopg.Connection, shared: Path) -> None:
-    seen = act(shared, "where", "12367.891", "-3.456")
+def test_place_on_the_image_is_told(rows: psycopg.Connection, look: Look) -> None:
+    seen = look("where", "12367.891", "-3.456")
     title, text = seen["told"]
     assert title == "12+367.891"
     numbers = [float(number) for number in re.findall(r"-?\d+\.\d+", text)]
@@ -628,15 +631,16 @@ def test_inspector_edits_and_what_is_stale_can_be_recomputed(conn: psycopg.Conne
     conn.execute("DELETE FROM tunnel.run WHERE stage = 'detect'")
     conn.commit()
     project.write_text(project.read_text().replace("host=", "user='mover' host="), encoding="utf-8")
-    assert act(project, "move_vertex", "1235", "0", "0.125")["saved"]
-    assert act(project, "review", "3", "confirmed", "wet")["saved"]
+    with opened(project) as look:
+        assert look("move_vertex", "1235", "0", "0.125")["saved"]
+        assert look("review", "3", "confirmed", "wet")["saved"]
+        commands = look("recompute")
     edited = conn.execute("SELECT n, edited_by FROM tunnel.axis_vertex WHERE source = 'edited'").fetchall()
     assert edited == [(1235, "mover")]
     assert conn.execute("SELECT reviewed_by FROM tunnel.finding WHERE id = 3").fetchone() == ("mover",)
     stale = conn.execute("SELECT stage FROM tunnel_api.stage_status WHERE stale ORDER BY step").fetchall()
     assert stale == [("segments",), ("sections",), ("ground",)]
     # as the action has it, but by one who may: without its points the example itself cannot be computed
-    commands = act(project, "recompute")
     assert commands["segment"] == commands["axis_vertex"]
     words = [word.replace("user='mover'", "") for word in commands["axis_vertex"]]
     assert words[3:] == ["run", "demo-2024", "--stale"]
@@ -654,8 +658,8 @@ def test_inspector_edits_and_what_is_stale_can_be_recomputed(conn: psycopg.Conne
         "action_unrolled",
     ],
 )  # fmt: skip
-def test_layer_added_by_hand_finds_its_style_srid_and_height(shared: Path, view: str) -> None:
-    added = act(shared, "add", view)
+def test_layer_added_by_hand_finds_its_style_srid_and_height(look: Look, view: str) -> None:
+    added = look("add", view)
     assert added["valid"]
     assert added["loaded"], "no default style"
     assert added["renderer"] in ("categorizedSymbol", "RuleRenderer", "singleSymbol")
@@ -747,16 +751,13 @@ def test_the_image_in_colour_is_drawn_as_it_is(conn: psycopg.Connection, example
     """Also a colour with bands of 0, which is no missing value."""
     add_image_in_colour(conn, "demo-2024")
     assert write(tmp_path / "demo.qgz").exit_code == 0
-    seen = act(tmp_path / "demo.qgz", "describe")
-    assert "demo-2024-km012-rgb" not in seen["themes"]["Unrolled"]
-    for place, colour in ((2.0, ABOVE), (-2.0, BELOW)):
-        act(
-            tmp_path / "demo.qgz", "draw_layer", "demo-2024-km012-rgb", f"12350,{place - 0.5},12351,{place + 0.5}",
-            str(tmp_path / "r.png"),
-        )  # fmt: skip
-        drawn = np.asarray(Image.open(tmp_path / "r.png").convert("RGB")).reshape(-1, 3)
-        kinds, counts = np.unique(drawn, axis=0, return_counts=True)
-        assert kinds[counts.argmax()].tolist() == list(colour)
+    with opened(tmp_path / "demo.qgz") as look:
+        assert "demo-2024-km012-rgb" not in look("describe")["themes"]["Unrolled"]
+        for place, colour in ((2.0, ABOVE), (-2.0, BELOW)):
+            picture = tmp_path / "r.png"
+            look("draw_layer", "demo-2024-km012-rgb", f"12350,{place - 0.5},12351,{place + 0.5}", str(picture))
+            kinds, counts = np.unique(np.asarray(Image.open(picture).convert("RGB")).reshape(-1, 3), axis=0, return_counts=True)
+            assert kinds[counts.argmax()].tolist() == list(colour)
 
 
 @pytest.mark.parametrize("kind", ["offset", "corrected"])
@@ -778,15 +779,17 @@ def test_lining_of_profiles_apart_is_seen(conn: psycopg.Connection, example: str
     assert shares[1] / shares[0] == pytest.approx(5, abs=0.25)
     held = np.isfinite(layers[0])
     assert np.array_equal(layers[0][held], layers[1][held]), "what was measured is as it was"
-    seen = act(project, "describe")
+    with opened(project) as look:
+        seen = look("describe")
+        for name in names:
+            look("draw_layer", name, "12352,-3,12392,3", str(tmp_path / f"{name}.png"))
     for theme in ("Unrolled", "Inspection sheets"):
         assert [name for name in seen["themes"][theme] if name in names] == list(names), "the measured one on top"
     white = []
     for name in names:
-        act(project, "draw_layer", name, "12352,-3,12392,3", str(tmp_path / "r.png"))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", NotGeoreferencedWarning)
-            image = rasterio.open(tmp_path / "r.png")
+            image = rasterio.open(tmp_path / f"{name}.png")
         with image:
             white.append(float((image.read([1, 2, 3]) > 250).all(axis=0)[200:-200].mean()))
     assert white[0] > 0.5

@@ -13,7 +13,7 @@ import rasterio
 from click.testing import CliRunner, Result
 from rasterio.errors import NotGeoreferencedWarning
 from support.example_survey import add_later_survey
-from support.qgis import act
+from support.qgis import act, opened
 
 from tunneldb.cli.main import main
 
@@ -84,17 +84,17 @@ def test_pictures_show_red_grey_and_hatches(conn: psycopg.Connection, partly: No
     conn.commit()
     project = tmp_path / "demo.qgz"
     assert write(project, "--elements", "blocks", "--scheme", "example").exit_code == 0
-    for theme in ("Map", "Unrolled"):
-        picture = tmp_path / f"{theme}.png"
-        assert act(project, "render", theme, str(picture)) == {"saved": True, "errors": []}
-    picture = tmp_path / "layer.png"
-    assert act(project, "draw_layer", "rating_unrolled", "12295,-40,12505,44", str(picture))["saved"]
-    red, green, blue = pixels(picture)
+    rating, action = tmp_path / "rating.png", tmp_path / "action.png"
+    with opened(project) as look:
+        for theme in ("Map", "Unrolled"):
+            assert look("render", theme, str(tmp_path / f"{theme}.png")) == {"saved": True, "errors": []}
+        assert look("draw_layer", "rating_unrolled", "12295,-40,12505,44", str(rating))["saved"]
+        assert look("draw_layer", "action_unrolled", "12295,-40,12505,44", str(action))["saved"]
+    red, green, blue = pixels(rating)
     orange = (red > 220) & (green > 150) & (green < 230) & (blue < 200)
     assert orange.sum() > 5000, "block 3"
     assert not ((green > red + 25) & (green > blue + 25)).any(), "no block was found good"
-    assert act(project, "draw_layer", "action_unrolled", "12295,-40,12505,44", str(picture))["saved"]
-    red, green, blue = pixels(picture)
+    red, green, blue = pixels(action)
     assert ((red > 180) & (green < 40) & (blue < 40)).sum() > 20, "the overdue action"
 
 

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import shutil
-import unicodedata
 import warnings
 from pathlib import Path
 
 import numpy as np
 import psycopg
-import pypdf
 import rasterio
 from rasterio.errors import NotGeoreferencedWarning
 from support.command import output_of
 from support.example_structures import add_example_site, save_example_structures
+from support.pdf import words
 from support.qgis import act
 from support.system import missing
 
@@ -56,7 +55,7 @@ def test_a_site(conn: psycopg.Connection, tmp_path: Path) -> None:
     # A page for each member, with its own spots.
     pdf = tmp_path / "members.pdf"
     assert act(project, "atlas", str(pdf), "Members") == {"saved": True, "error": "", "sheets": 2}
-    wall, pipe = (" ".join(unicodedata.normalize("NFKC", page.extract_text()).split()) for page in pypdf.PdfReader(pdf).pages)
+    wall, pipe = words(pdf)
     assert "Member 1, flat" in wall
     assert "2 faces, 6.00 m2, 96.7 % inspected; 1 spot, dark 0.0000 m2, bright 0.1255 m2" in wall
     assert "shadow" in wall

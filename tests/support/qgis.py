@@ -5,9 +5,12 @@ from __future__ import annotations
 import json
 import os
 import subprocess
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from support.system import missing
 
@@ -40,3 +43,44 @@ def act(project: Path | str, *arguments: str, before: tuple[str, ...] = (), **en
     result = json.loads(done.stdout.splitlines()[-1])
     assert isinstance(result, dict)
     return result
+
+
+class Look(Protocol):
+    """An action on a project that is open, in words."""
+
+    def __call__(self, *words: str) -> dict[str, Any]: ...
+
+
+@contextmanager
+def opened(project: Path) -> Iterator[Look]:
+    """Open a project once; return a function that runs an action on it, as `act` does."""
+    if not has_qgis():
+        missing("QGIS")
+    with tempfile.TemporaryFile("w+") as errors:
+        process = subprocess.Popen(
+            [PYTHON, str(SCRIPT), str(project), "serve"],
+            env=ENVIRONMENT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=errors, text=True,
+        )  # fmt: skip
+        assert process.stdin is not None
+        assert process.stdout is not None
+        asked, answers = process.stdin, process.stdout
+
+        def look(*words: str) -> dict[str, Any]:
+            asked.write(json.dumps(words) + "\n")
+            asked.flush()
+            answer = answers.readline()
+            if not answer:
+                process.wait()
+                errors.seek(0)
+                raise AssertionError(errors.read())
+            result = json.loads(answer)
+            assert isinstance(result, dict)
+            return result
+
+        try:
+            yield look
+        finally:
+            if process.poll() is None:
+                asked.close()
+            process.wait()
+            answers.close()

@@ -8,7 +8,7 @@ import psycopg
 import pytest
 from playwright.sync_api import BrowserContext, Page, expect
 from support.databases import Copies
-from support.desk_page import comes_to, forgive, opened, settled, tab
+from support.desk_page import comes_to, forgive, opened, position, settled, tab
 from support.long_survey import FINDINGS, KILOMETRES, NAME, make_long_survey
 
 TWENTY = 20_000.0
@@ -45,8 +45,8 @@ def test_whole_tunnel_is_on_one_screen_and_leads_to_a_pixel(page: Page) -> None:
     page.locator("#map").hover()
     for _ in range(40):
         page.mouse.wheel(0, -400)
-        page.wait_for_timeout(60)
-        if settled(page)["z"] > 22.9:
+        page.wait_for_timeout(100)
+        if position(page)["z"] > 22.9:
             break
     near = settled(page)
     assert near["z"] > 22.9

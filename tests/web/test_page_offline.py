@@ -17,6 +17,9 @@ from web.conftest import PASSWORD
 from web.test_page_narrow import PHONE, overflows
 
 STRETCH = "12+300", "12+360"
+SHORT = "12+315", "12+320"
+"""Holds finding 1, in a fifth of the tiles of STRETCH."""
+
 VIEW = f"/#/{NAME}?x=12330&y=0&z=20"
 
 QUIET = "ERR_INTERNET_DISCONNECTED|ERR_FAILED|ERR_CONNECTION|status of 503|status of 401|status of 409"
@@ -164,7 +167,7 @@ def test_a_shift_without_a_network(tablets: Tablets, database: psycopg.Connectio
 def test_a_phone_records_by_touch(tablets: Tablets, database: psycopg.Connection) -> None:
     phone = tablets(**PHONE)
     with opened(phone, VIEW) as page:
-        take(page)
+        take(page, SHORT)
         assert not overflows(page)
         phone.set_offline(True)
         page.goto(f"/#/{NAME}/finding/1")
@@ -229,7 +232,7 @@ def test_another_inspector_was_faster(
     """Nothing is written over, and nothing is dropped, until the person decides."""
     tablet, other = tablets(), tablets("ivo_web")
     with opened(tablet, f"/#/{NAME}/finding/1") as page:
-        take(page)
+        take(page, SHORT)
         tablet.set_offline(True)
         tab(page, "Finding")
         page.keyboard.press("c")
@@ -263,7 +266,7 @@ def test_sign_out_removes_what_is_held(tablets: Tablets) -> None:
     """The page removes unsent records only after the person has confirmed it."""
     tablet = tablets()
     with opened(tablet, f"/#/{NAME}/finding/1") as page:
-        take(page)
+        take(page, SHORT)
         assert len(stored(page)) == 3
         page.route("**/api/findings/1", lambda route: route.abort() if route.request.method == "PATCH" else route.fallback())
         tab(page, "Finding")
@@ -290,7 +293,7 @@ def test_another_user_of_the_tablet_sees_nothing(tablets: Tablets, database: psy
     """The copies go; what the first one recorded waits unseen until they sign in again."""
     tablet = tablets()
     with opened(tablet, f"/#/{NAME}/finding/1") as page:
-        take(page)
+        take(page, SHORT)
         tablet.route("**/api/findings/1", lambda r: r.abort() if r.request.method == "PATCH" else r.fallback())
         tab(page, "Finding")
         page.keyboard.press("c")
@@ -319,7 +322,7 @@ def test_another_user_of_the_tablet_sees_nothing(tablets: Tablets, database: psy
 def test_a_viewer_takes_a_stretch_and_records_nothing(tablets: Tablets) -> None:
     tablet = tablets("viola_web")
     with opened(tablet, f"/#/{NAME}/finding/1") as page:
-        take(page)
+        take(page, SHORT)
         tablet.set_offline(True)
         page.reload()
         shows(page, "no. 1")
@@ -374,8 +377,8 @@ def test_a_download_is_cancelled_and_resumed(tablets: Tablets) -> None:
         (("13+000", "13+100"), "The survey reaches"),
     ],
 )
-def test_wrong_stretches_get_one_line(tablets: Tablets, stretch: tuple[str, str], said: str) -> None:
-    with opened(tablets(), VIEW) as page:
+def test_wrong_stretches_get_one_line(ines_context: BrowserContext, stretch: tuple[str, str], said: str) -> None:
+    with opened(ines_context, VIEW) as page:
         panel = tab(page, "Offline")
         panel.get_by_label("From", exact=True).fill(stretch[0])
         panel.get_by_label("To", exact=True).fill(stretch[1])
@@ -387,7 +390,7 @@ def test_wrong_stretches_get_one_line(tablets: Tablets, stretch: tuple[str, str]
 def test_what_is_older_than_a_day_is_removed(tablets: Tablets) -> None:
     tablet = tablets()
     with opened(tablet, VIEW) as page:
-        take(page)
+        take(page, SHORT)
         page.evaluate(
             """async () => {
               const name = (await caches.keys()).find((one) => one.startsWith('tunneldb.stretch.'));

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
 
 import psycopg
 import pytest
@@ -41,7 +42,7 @@ def rows(database: psycopg.Connection) -> list[tuple[str | None, str]]:
     ).fetchall()
 
 
-def choose(page: Page, button: str, payload: list[FilePayload]) -> None:
+def choose(page: Page, button: str, payload: Sequence[FilePayload] | Sequence[Path]) -> None:
     """Give files to the chooser that a button opens."""
     with page.expect_file_chooser() as chooser:
         page.locator(".photos").get_by_role("button", name=button).click()
@@ -118,7 +119,7 @@ def test_a_failed_read_does_not_hide_what_became_of_a_record(
     ines_context.unroute("**/summary")
 
 
-def test_what_is_no_photo_is_said_in_one_line(shown: Page, database: psycopg.Connection) -> None:
+def test_what_is_no_photo_is_said_in_one_line(shown: Page, database: psycopg.Connection, tmp_path: Path) -> None:
     page = shown
     page_file: FilePayload = {"name": "evil.jpg", "mimeType": "image/jpeg", "buffer": b"<script>alert(1)</script>"}
     choose(page, "Add photos", [page_file, *files(4)])
@@ -127,7 +128,8 @@ def test_what_is_no_photo_is_said_in_one_line(shown: Page, database: psycopg.Con
     expect(line).to_contain_text("evil.jpg: not saved: the photo is not a JPEG, PNG or WebP picture")
     line.get_by_role("button", name="Discard").click()
     expect(line).to_have_count(0)
-    large: FilePayload = {"name": "large.jpg", "mimeType": "image/jpeg", "buffer": bytes(26_000_000)}
+    large = tmp_path / "large.jpg"
+    large.write_bytes(bytes(26_000_000))
     choose(page, "Add photos", [large])
     expect(line).to_contain_text("large.jpg: not saved: it has 26 MB; a photo has at most 25 MB")
     line.get_by_role("button", name="Discard").click()

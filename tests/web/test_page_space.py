@@ -225,7 +225,7 @@ def test_opening_many_times_keeps_no_graphics(space: Page) -> None:
     page = space
     warned: list[str] = []
     page.on("console", lambda message: warned.append(message.text))
-    for _ in range(20):
+    for _ in range(17):
         page.get_by_role("button", name="Unrolled lining").click()
         show(page)
     assert not [text for text in warned if "context" in text.lower()]

@@ -18,8 +18,6 @@ from psycopg.conninfo import make_conninfo
 from support.command import errors_of
 from web.conftest import PASSWORD
 
-from tunneldb.web.protocol import FIRST_REQUEST
-
 COMMAND = [sys.executable, "-c", "from tunneldb.cli.main import main; main()", "serve", "--no-open"]
 
 
@@ -128,13 +126,19 @@ def test_embedded_server_is_not_for_a_proxy(installed: str, monkeypatch: pytest.
     assert "for this machine only" in errors_of("serve", "--behind-proxy", code=2)
 
 
-def test_half_requests_are_closed(served: subprocess.Popen[str]) -> None:
-    assert served.stdout is not None
-    port = int(served.stdout.readline().strip().rstrip("/").rpartition(":")[2])
-    with socket.create_connection(("127.0.0.1", port)) as slow:
-        slow.sendall(b"GET / HT")
-        slow.settimeout(FIRST_REQUEST + 10)
-        assert slow.recv(100) == b""
+IMPATIENT = "from tunneldb.cli.main import main; from tunneldb.web import protocol; protocol.FIRST_REQUEST = 1.0; main()"
+
+
+def test_half_requests_are_closed(dsn: str, example: str) -> None:
+    words = [sys.executable, "-c", IMPATIENT, *COMMAND[3:], "--port", "0"]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env={**os.environ, "TUNNELDB_DSN": dsn}) as process:
+        assert process.stdout is not None
+        port = int(process.stdout.readline().strip().rstrip("/").rpartition(":")[2])
+        with socket.create_connection(("127.0.0.1", port)) as slow:
+            slow.sendall(b"GET / HT")
+            slow.settimeout(20)
+            assert slow.recv(100) == b""
+        process.terminate()
 
 
 def test_taken_port(dsn: str, served: subprocess.Popen[str]) -> None:
