@@ -133,12 +133,14 @@ def test_half_requests_are_closed(dsn: str, example: str) -> None:
     words = [sys.executable, "-c", IMPATIENT, *COMMAND[3:], "--port", "0"]
     with subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env={**os.environ, "TUNNELDB_DSN": dsn}) as process:
         assert process.stdout is not None
-        port = int(process.stdout.readline().strip().rstrip("/").rpartition(":")[2])
-        with socket.create_connection(("127.0.0.1", port)) as slow:
-            slow.sendall(b"GET / HT")
-            slow.settimeout(20)
-            assert slow.recv(100) == b""
-        process.terminate()
+        try:
+            port = int(process.stdout.readline().strip().rstrip("/").rpartition(":")[2])
+            with socket.create_connection(("127.0.0.1", port)) as slow:
+                slow.sendall(b"GET / HT")
+                slow.settimeout(20)
+                assert slow.recv(100) == b""
+        finally:
+            process.terminate()
 
 
 def test_taken_port(dsn: str, served: subprocess.Popen[str]) -> None:

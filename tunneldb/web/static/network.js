@@ -19,7 +19,8 @@ export class Network {
     if (!held && (navigator.onLine || !worker?.controller)) return;
     this.away = true;
     this.since = held;
-    this.later();
+    if (navigator.onLine) this.probe();
+    else this.later();
   }
 
   /** Note that the server cannot be reached, and the time of what is shown instead. */
