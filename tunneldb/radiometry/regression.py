@@ -264,7 +264,7 @@ class _Problem:
 
     def _spread(self, left: Float, weights: _Weights, means: Float, between: Float) -> Float:
         """Return the variance of the scores (Conley, 1999): common effects of the section, and neighbouring cells."""
-        from scipy import signal  # half of all that workers import, and most need it never
+        from scipy import signal  # its import takes as long as a third of all others, and few need it
 
         cells = self.cells
         scores = means * between[:, None]
