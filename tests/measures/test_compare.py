@@ -19,7 +19,7 @@ from tunneldb.raster.geotiff import Raster, encode
 from tunneldb.raster.grid import Grid
 from tunneldb.raster.state import PixelState
 
-PIXEL, NOISE = 0.025, 0.002
+PIXEL, NOISE = 1 / 30, 0.0015
 PATCH = (1009.5, 1012.5, -1.0, 1.0)
 """Lining that stands in by 4 mm: chainage and arc from and to, m."""
 

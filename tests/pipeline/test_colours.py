@@ -6,6 +6,8 @@ import base64
 import io
 import json
 import re
+import shutil
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +18,7 @@ from PIL import Image
 from rasterio.enums import ColorInterp
 from support.coloured_scan import paint, stripes
 from support.command import command
+from support.databases import Copies
 
 from tunneldb.raster.geotiff import decode
 from tunneldb.raster.state import PixelState
@@ -25,12 +28,37 @@ NAME = "painted"
 START = 12_310.0
 
 
-def survey(folder: Path) -> None:
+@pytest.fixture(scope="module")
+def scans(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Files of a tunnel without colours, to be copied and painted."""
+    folder = tmp_path_factory.mktemp("scans")
     parameters = Parameters(
-        name=NAME, section="circular", seed=4, start_chainage=START, length=16.0, scanner="profiler", profile_spacing=0.018,
-        profile_points=1300, leaks=2,
+        name=NAME, section="circular", seed=4, start_chainage=START, length=16.0, scanner="profiler", profile_spacing=0.025,
+        profile_points=1000, leaks=2,
     )  # fmt: skip
     write(Simulation(parameters), folder)
+    return folder
+
+
+@pytest.fixture
+def unpainted(scans: Path, tmp_path: Path) -> Path:
+    """Folder with files of its own."""
+    shutil.copytree(scans, tmp_path, dirs_exist_ok=True)
+    return tmp_path
+
+
+@pytest.fixture(scope="module")
+def striped(copies: Copies, template: str, scans: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """A database of the tunnel in stripes of 16 bits through all stages, to be copied."""
+    folder = tmp_path_factory.mktemp("striped") / "scans"
+    shutil.copytree(scans, folder)
+    paint(folder, stripes)
+
+    def fill() -> None:
+        assert "colours are read as 8 bits" not in run(folder)
+
+    with copies.prepared(template, fill) as name:
+        yield name
 
 
 def run(folder: Path) -> str:
@@ -50,14 +78,19 @@ def blocks(conn: psycopg.Connection, kind: str) -> list[bytes]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("full", "point_format"), [(65535, 7), (255, 3)])
-def test_pixels_have_the_colours_of_their_places(
-    conn: psycopg.Connection, tmp_path: Path, full: int, point_format: int
-) -> None:
-    survey(tmp_path)
-    paint(tmp_path, stripes, full=full, point_format=point_format)
-    output = run(tmp_path)
-    assert ("colours are read as 8 bits" in output) == (full == 255)
+def test_pixels_have_the_colours_of_their_places(copies: Copies, striped: str) -> None:
+    with copies.connected(striped) as conn:
+        check_colours(conn)
+
+
+@pytest.mark.slow
+def test_colours_of_8_bits_are_told_and_the_same(conn: psycopg.Connection, unpainted: Path) -> None:
+    paint(unpainted, stripes, full=255, point_format=3)
+    assert "colours are read as 8 bits" in run(unpainted)
+    check_colours(conn)
+
+
+def check_colours(conn: psycopg.Connection) -> None:
     (tiff,) = blocks(conn, "rgb")
     image, plain = decode(tiff, "rgb"), decode(blocks(conn, "corrected")[0])
     assert image.transform == plain.transform
@@ -82,19 +115,20 @@ def test_pixels_have_the_colours_of_their_places(
 
 
 @pytest.mark.slow
-def test_a_scan_without_colours_has_no_such_image(conn: psycopg.Connection, tmp_path: Path) -> None:
-    survey(tmp_path)
-    paint(tmp_path, lambda chainage, _: np.zeros((len(chainage), 3)))
-    assert "they are black or fractions of 1" in run(tmp_path)
+def test_a_scan_without_colours_has_no_such_image(conn: psycopg.Connection, unpainted: Path) -> None:
+    paint(unpainted, lambda chainage, _: np.zeros((len(chainage), 3)))
+    assert "they are black or fractions of 1" in run(unpainted)
     assert not blocks(conn, "rgb")
     assert blocks(conn, "corrected")
 
 
 @pytest.mark.slow
-def test_images_in_colour_are_exported_and_shown(conn: psycopg.Connection, tmp_path: Path) -> None:
-    survey(tmp_path)
-    paint(tmp_path, stripes)
-    run(tmp_path)
+def test_images_in_colour_are_exported_and_shown(copies: Copies, striped: str, tmp_path: Path) -> None:
+    with copies.connected(striped) as conn:
+        check_documents(conn, tmp_path)
+
+
+def check_documents(conn: psycopg.Connection, tmp_path: Path) -> None:
     stored = decode(blocks(conn, "rgb")[0], "rgb")
     command("image", NAME, "-o", tmp_path / "images")
     with rasterio.open(tmp_path / "images" / f"{NAME}-km012-rgb.tif") as image:

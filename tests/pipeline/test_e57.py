@@ -17,7 +17,7 @@ from tunneldb.simulate import Parameters, Simulation, write
 pytest.importorskip("pye57")
 from support import e57_files as e57
 
-START = 12_988.0  # the kilometre changes in the middle
+START = 12_992.0  # the kilometre changes in the middle
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +27,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     write(
         Simulation(
             Parameters(
-                name="t", start_chainage=START, length=24.0, scanner="static", station_spacing=12.0, angular_step=0.35,
+                name="t", start_chainage=START, length=16.0, scanner="static", station_spacing=8.0, angular_step=0.4,
                 leaks=6, leak_area=(0.2, 1.5), seed=1,
             )
         ),

@@ -30,14 +30,19 @@ MODELS = {
     "ground": "n, km, across, height, gamma, foot, lean, arc_left, arc_right, ST_AsBinary(geom)",
     "lining": 'km, cell, box, "offset", spread',
     "cluster": "km, class, chainage_from, chainage_to, height_from, height_to, points, cells, ST_AsBinary(geom)",
-    "point": 'km, chainage, ST_AsBinary(geom), segment, scan_id, file_id, intensity, classification, "class"',
 }
+POINTS = """
+    SELECT km, count(*), sum(hash_record_extended(ROW(chainage, ST_AsBinary(geom), segment, scan_id, file_id, intensity,
+                                                      classification, "class"), 0))
+      FROM tunnel.point GROUP BY km ORDER BY km
+"""
+"""Of each kilometre how many points there are, and a number that any change of one of them changes."""
 
 
 def scene(**others: object) -> Simulation:
     """A tunnel over the end of a kilometre, with people and cases in it."""
     options: dict[str, object] = {
-        "start_chainage": START, "length": 40.0, "profile_spacing": 0.025, "profile_points": 1000, "leaks": 2, "people": 3,
+        "start_chainage": START, "length": 40.0, "profile_spacing": 0.035, "profile_points": 800, "leaks": 2, "people": 3,
         "equipment": 3, "free_cables": 1, "ballast": 0.02,
     }  # fmt: skip
     return Simulation(parameters("profiler", 2, **(options | others)))
@@ -97,6 +102,7 @@ def contents(conn: psycopg.Connection) -> dict[str, list[tuple[Any, ...]]]:
         table: conn.execute(f"SELECT {columns} FROM tunnel.{table} ORDER BY 1, 2, 3, 4").fetchall()
         for table, columns in MODELS.items()
     }
+    found["point"] = conn.execute(POINTS).fetchall()
     conn.rollback()
     return found
 

@@ -36,7 +36,7 @@ from tunneldb.store.scene import load_arcs
 from tunneldb.store.surface import load_surface
 from tunneldb.store.survey import Survey, get_survey
 
-START, PLANE = 12_990.0, 13_000.0
+START, PLANE, LENGTH = 12_992.0, 13_000.0, 16.0
 SHIFT = 480.0
 """So much lower is the chainage at which there is no end: a multiple of all that is laid out along the tunnel, m."""
 
@@ -64,7 +64,7 @@ def scan(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("border")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(generate, "place", lambda *_: [Leak(k, wet, wet.area, 3.0) for k, wet in enumerate(WET, 1)])
-        write(Simulation(parameters("profiler", 1, start_chainage=START, profile_spacing=0.025, profile_points=1000)), folder)
+        write(Simulation(parameters("profiler", 1, start_chainage=START, length=LENGTH)), folder)
     return folder
 
 
@@ -105,7 +105,7 @@ def uncut(sections: psycopg.Connection, monkeypatch: pytest.MonkeyPatch) -> list
     first, values = int(START - SHIFT), settings()
     inputs = job.load_inputs(conn, survey, 12, values)
     assert inputs.sample is not None
-    floor = Floor.of(first, *load_arcs(conn, survey, int(START), int(START) + 24))
+    floor = Floor.of(first, *load_arcs(conn, survey, int(START), int(START + LENGTH)))
     depth = values["lining.tolerance"], values["lining.recess"]
     grid = job.kilometre_grid(surface, 12, PIXEL)
     (points,) = conn.execute("SELECT points FROM tunnel.scan_file").fetchone()

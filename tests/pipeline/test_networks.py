@@ -17,19 +17,20 @@ from tunneldb.segmentation.network import standard_network
 from tunneldb.simulate import Simulation, generate, write
 from tunneldb.simulate.lining.leaks import Leak
 
-BAND = shapely.box(START + 1.0, 2.0, START + 15.0, 2.5)
+LENGTH = 10.0
+BAND = shapely.box(START + 1.0, 2.0, START + LENGTH - 1.0, 2.5)
 """A wet band along nearly the whole tunnel: a threshold takes it for the level of dry lining."""
 
 
 @pytest.fixture(scope="module")
 def tunnel(copies: Copies, template: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """A tunnel of 16 m with one wet band, run up to the ground."""
+    """A short tunnel with one wet band, run up to the ground."""
 
     def fill() -> None:
         folder = tmp_path_factory.mktemp("networks")
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(generate, "place", lambda *_: [Leak(1, BAND, BAND.area, 4.0)])
-            write(Simulation(parameters("static", 2, length=16.0)), folder)
+            write(Simulation(parameters("static", 2, length=LENGTH)), folder)
         prepare(folder, "static")
         command("run", NAME, "--to", "ground")
 

@@ -25,7 +25,7 @@ def cloud(tmp_path: Path) -> Path:
     write(
         Simulation(
             Parameters(
-                name="t", length=20.0, scanner="profiler", profile_spacing=0.02, profile_points=1000, leaks=4,
+                name="t", length=20.0, scanner="profiler", profile_spacing=0.025, profile_points=1000, leaks=4,
                 leak_area=(0.3, 1.0), seed=4,
             )
         ),

@@ -58,8 +58,9 @@ def panorama(surface, place: np.ndarray, turn: Rotation, columns: int = 3600) ->
         reach = np.linalg.norm(own)
         across = (azimuth - np.arctan2(own[1], own[0]) + np.pi) % (2 * np.pi) - np.pi
         level = np.arcsin(own[2] / reach)
-        far = np.hypot(across[None, :] * np.cos(level), elevation[:, None] - level) * reach
-        pixels[far < 0.06] = 255
+        near = np.flatnonzero(np.abs(elevation - level) * reach < 0.06)
+        far = np.hypot(across[None, :] * np.cos(level), elevation[near, None] - level) * reach
+        pixels[near] = np.where((far < 0.06)[:, :, None], np.uint8(255), pixels[near])
     numbers = {"pixelWidth": step, "pixelHeight": step}
     return Shot(pixels, "sphericalRepresentation", numbers, tuple(place), turn, f"at {place[0]:.0f}")
 

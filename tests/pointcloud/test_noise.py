@@ -82,8 +82,8 @@ def test_few_are_judged_as_all_are(judged: int) -> None:
 
 
 def test_at_full_density_the_filter_is_the_papers() -> None:
-    xyz = tube(20_000, 1.0, seed=2)
-    xyz = np.concatenate([xyz, strays(10, 1.0, seed=3)])
+    xyz = tube(20_000, 0.4, seed=2)
+    xyz = np.concatenate([xyz, strays(10, 0.4, seed=3)])
     expected = cKDTree(xyz).query_ball_point(xyz, 0.025, return_length=True) < 5
     np.testing.assert_array_equal(noise_filter(xyz), expected)
 

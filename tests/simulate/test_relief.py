@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
+from support.lining_scans import inside
 
 from tunneldb.simulate import Cloud, Parameters, Simulation, simulate
 from tunneldb.simulate.radiometry import oren_nayar
@@ -218,14 +219,13 @@ def test_drips_hang_below_their_leaks_and_are_wet() -> None:
     dry = Simulation(Parameters(**{**BARE, **p}))
     assert sum(k.polygon.geom_type == "MultiPolygon" for k in simulation.leaks) >= 3
     lining = cloud.klass == 0
-    points = shapely.points(cloud.chainage[lining], cloud.arc[lining])
+    points = np.column_stack([cloud.chainage, cloud.arc])[lining]
     for leak, before in zip(simulation.leaks, dry.leaks, strict=True):
         assert leak.polygon.is_valid
         assert leak.id == before.id
         assert leak.polygon.contains(before.polygon.buffer(-1e-6))
-        inside = shapely.contains(leak.polygon, points)
-        differ = inside != (cloud.leak[lining] == leak.id)
-        assert np.all(shapely.distance(leak.polygon.boundary, points[differ]) < 1e-5)
+        differ = inside(leak.polygon, points) != (cloud.leak[lining] == leak.id)
+        assert np.all(shapely.distance(leak.polygon.boundary, shapely.points(points[differ])) < 1e-5)
         down = np.sign(before.polygon.centroid.y)
         drips = leak.polygon.difference(before.polygon.buffer(1e-6))
         for drip in () if drips.is_empty else getattr(drips, "geoms", [drips]):
@@ -237,11 +237,11 @@ def test_edges_of_leaks_are_as_soft_as_asked() -> None:
     simulation, cloud = scan(leaks=2, leak_edge=0.2, leak_area=(0.8, 1.0), seed=8, profile_points=1500)
     lining = cloud.klass == 0
     rest = (cloud.reflectance - oren_nayar(np.cos(cloud.incidence.astype(float)), 12.0) - 10.0 * np.log10(0.3))[lining]
-    points = shapely.points(cloud.chainage[lining], cloud.arc[lining])
+    points = np.column_stack([cloud.chainage, cloud.arc])[lining]
     for leak in simulation.leaks:
-        near = shapely.dwithin(leak.polygon, points, 0.5)
-        depth = shapely.distance(leak.polygon.boundary, points[near]) * np.where(
-            shapely.contains(leak.polygon, points[near]), 1, -1
+        near = inside(leak.polygon.buffer(0.5), points)
+        depth = shapely.distance(leak.polygon.boundary, shapely.points(points[near])) * np.where(
+            inside(leak.polygon, points[near]), 1, -1
         )
         share = -rest[near] / leak.drop
         assert np.abs(share[depth < -0.1]).max() < 1e-4

@@ -24,7 +24,7 @@ PIXELS = [(40, 60), (70, 750), (1400, 100), (2000, 700), (3300, 450), (4000, 70)
 def temperature(chainage: np.ndarray, arc: np.ndarray) -> np.ndarray:
     out = np.full(np.broadcast_shapes(chainage.shape, arc.shape), 10.0)
     for x, y in SPOTS:
-        out += 8.0 * np.exp(-((chainage - x) ** 2 + (arc - y) ** 2) / (2 * 0.15**2))
+        out += 8.0 * np.exp(-((chainage - x) ** 2) / (2 * 0.15**2)) * np.exp(-((arc - y) ** 2) / (2 * 0.15**2))
     return out
 
 

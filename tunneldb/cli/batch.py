@@ -133,7 +133,7 @@ def _work(survey: Survey, dsn: str | None, count: int) -> Watch:
         team.start()
         while team.tend():
             watch.look()
-            time.sleep(1.0)
+            team.rest(1.0)
         watch.look()
     return watch
 

@@ -72,6 +72,12 @@ class WorkerPool:
                 self.members[self.members.index(member)] = _Member(self._launch(), time.monotonic(), falls)
         return bool(self.members)
 
+    def rest(self, seconds: float) -> None:
+        """Wait, but no longer than until all workers have exited by themselves."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end and any(member.process.poll() not in (0, 2) for member in self.members):
+            time.sleep(0.05)
+
     def leave(self) -> None:
         """Ask the workers to finish their current job and exit; if asked again, they exit at once."""
         for member in self.members:

@@ -111,6 +111,11 @@ class IntensitySamples:
         )
 
 
+def count_cells(place: Float) -> int:
+    """Return the number of cells that points at places (n, 2) or (n, 3), m, lie in."""
+    return len(_number(np.floor(place / CELL).astype(np.int64))[1])
+
+
 def group(samples: IntensitySamples, spline: RangeSpline, *, unrolled: bool) -> Cells:
     """Group points into cells; ``unrolled`` is True for places in the unrolled plane of a tunnel."""
     at = np.floor(samples.place / CELL).astype(np.int64)

@@ -25,7 +25,7 @@ import numpy as np
 
 from tunneldb.arrays import Bool, Float
 from tunneldb.errors import UserError
-from tunneldb.radiometry.cells import CELL, Cells, IntensitySamples, group
+from tunneldb.radiometry.cells import CELL, Cells, IntensitySamples, count_cells, group
 from tunneldb.radiometry.range_spline import RangeSpline
 from tunneldb.radiometry.reference_curve import ReferenceCurve
 from tunneldb.radiometry.regression import Fit, fit
@@ -148,7 +148,7 @@ def estimate_range_curve(
     angle = np.degrees(np.arccos(np.clip(samples.cosine, 0.0, 1.0)))
     usable = np.isfinite(samples.level) & (angle <= MAX_INCIDENCE) & (samples.cosine > 0) & (samples.range_m > 0)
     samples = samples.some(usable & np.isfinite(samples.place).all(axis=1))
-    count = len(np.unique(np.floor(samples.place / CELL), axis=0))
+    count = count_cells(samples.place)
     if count < MIN_CELLS:
         raise UserError(f"only {count} cells of {CELL:g} m of lining; a range curve needs at least {MIN_CELLS}; {ADVICE}")
     nearest, low, high, farthest = (

@@ -13,7 +13,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import signal
 from scipy.interpolate import CubicSpline
 
 from tunneldb.arrays import Float, Int64
@@ -265,6 +264,8 @@ class _Problem:
 
     def _spread(self, left: Float, weights: _Weights, means: Float, between: Float) -> Float:
         """Return the variance of the scores (Conley, 1999): common effects of the section, and neighbouring cells."""
+        from scipy import signal  # its import takes as long as a third of all others, and few need it
+
         cells = self.cells
         scores = means * between[:, None]
         if not self.unrolled:
@@ -326,6 +327,8 @@ def _covariances(left: Float, there: Float) -> tuple[Float, Float]:
         Additional covariance of neighbours, by their distance, up to k = NEIGHBOUR_DISTANCE / CELL and only where it is
         positive.
     """
+    from scipy import signal
+
     k, m = int(NEIGHBOUR_DISTANCE / CELL), int(MAX_LAG / CELL)
 
     def shifted(values: Float) -> Float:

@@ -11,6 +11,7 @@ import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cache
 from importlib.metadata import version
 from typing import Any, LiteralString
 
@@ -256,5 +257,11 @@ def versions(conn: psycopg.Connection[Any]) -> dict[str, str]:
         "python": platform.python_version(),
         "postgresql": row[0],
         "postgis": row[1],
-        **{name: version(name) for name in _LIBRARIES},
+        **_library_versions(),
     }
+
+
+@cache
+def _library_versions() -> dict[str, str]:
+    """Return the versions of the libraries as they were first asked for: a process keeps what it has imported."""
+    return {name: version(name) for name in _LIBRARIES}
