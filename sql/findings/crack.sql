@@ -142,8 +142,8 @@ SELECT s.id::bigint << 32 | e.id AS id, s.id AS survey_id, s.name AS survey, d.n
        tunnel_api.station_label(s.tunnel_id, e.chainage_to) AS label_to, c.lining AS lining_area, c.searched_share,
        c.cracks, c.length AS crack_length,
        -- no crack is no density of 0 where nobody searched for cracks
-       CASE WHEN c.cracks > 0 OR c.searched_share > 0 THEN c.length / nullif(c.lining, 0) END AS density, c.longitudinal AS longitudinal_length, c.transverse AS transverse_length,
-       c.oblique AS oblique_length, c.width_mm
+       CASE WHEN c.cracks > 0 OR c.searched_share > 0 THEN c.length / nullif(c.lining, 0) END AS density,
+       c.longitudinal AS longitudinal_length, c.transverse AS transverse_length, c.oblique AS oblique_length, c.width_mm
   FROM tunnel.survey s
   JOIN tunnel.element_set d ON d.tunnel_id = s.tunnel_id
  CROSS JOIN LATERAL tunnel_internal.element_cracks(s.id, d.id) c
