@@ -36,7 +36,7 @@ POINTS = """
                                                       classification, "class"), 0))
       FROM tunnel.point GROUP BY km ORDER BY km
 """
-"""Of each kilometre how many points there are, and a number that any change of one of them changes."""
+"""Number of points in each kilometre, and a checksum of all their values."""
 
 
 def scene(**others: object) -> Simulation:

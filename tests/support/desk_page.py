@@ -21,11 +21,15 @@ AXE = Axe()
 _troubles: dict[Page, list[str]] = {}
 
 
+def token_of(form: str) -> str:
+    """Return the token against forged requests of a form."""
+    return form.partition('name="csrf" value="')[2].partition('"')[0]
+
+
 def enter(context: BrowserContext, user: str, password: str) -> None:
     """Sign in with what the form would send, without a page."""
     context.set_default_timeout(PATIENCE)
-    form = context.request.get("/login").text()
-    token = form.partition('name="csrf" value="')[2].partition('"')[0]
+    token = token_of(context.request.get("/login").text())
     answer = context.request.post("/login", form={"user": user, "password": password, "csrf": token})
     assert answer.ok, answer.text()
     assert not answer.url.endswith("/login")

@@ -10,10 +10,10 @@ import pypdf
 from pypdf.generic import ContentStream, NameObject
 
 DRAWN = re.compile(rb"^(?!.*Q).*(?: (?:m|l|c|v|y|re|d|SCN|scn|gs|cs|CS)|\b[hn]|W\*?(?: n)?)[ \r]*$\n?", re.MULTILINE)
-"""Lines of a page that only draw, without q and Q: most lines, of which pypdf would read each number by itself."""
+"""Lines of a page that only draw, without q and Q. They are most lines, and pypdf would parse each of their numbers."""
 
 EMPTY = re.compile(rb"^q\n(?:[-+.\d ]+ cm\n)*Q\n", re.MULTILINE)
-"""What is set and put back with nothing between."""
+"""A state that is saved and restored, with nothing drawn between."""
 
 
 def words(path: Path) -> list[str]:

@@ -13,7 +13,7 @@ from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
 from psycopg import sql
 from starlette.testclient import TestClient
 from support.databases import Copies
-from support.desk_page import DESKTOP, enter, opened
+from support.desk_page import DESKTOP, enter, opened, token_of
 from support.desk_server import DeskServer
 from support.example_survey import NAME, add_later_survey
 
@@ -84,8 +84,7 @@ def signed_in(desk: Desk) -> Iterator[SignIn]:
 
 def sign_in(browser: TestClient, user: str, password: str = PASSWORD) -> httpx2.Response:
     """Fill in the form."""
-    form = browser.get("/login").text
-    token = form.partition('name="csrf" value="')[2].partition('"')[0]
+    token = token_of(browser.get("/login").text)
     return browser.post("/login", data={"user": user, "password": password, "csrf": token})
 
 

@@ -9,6 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 import psycopg
 import pytest
 from starlette.testclient import TestClient
+from support.desk_page import token_of
 from web.conftest import PASSWORD, SignIn, sign_in
 
 from tunneldb.web.app import create_app
@@ -74,7 +75,7 @@ def test_form_of_another_page_is_refused(client: TestClient) -> None:
 
 def test_a_second_form_leaves_the_first_one_valid(client: TestClient) -> None:
     first, _ = client.get("/login").text, client.get("/login")
-    token = first.partition('name="csrf" value="')[2].partition('"')[0]
+    token = token_of(first)
     assert client.post("/login", data={"user": "viola_web", "password": PASSWORD, "csrf": token}).status_code in (200, 303)
     assert client.get("/api/surveys").status_code == 200
 
@@ -112,8 +113,7 @@ def test_one_address_cannot_try_all_users() -> None:
 
 def test_attempts_at_the_same_time_are_counted(client: TestClient) -> None:
     """The database answers later than all of them have come."""
-    form = client.get("/login").text
-    token = form.partition('name="csrf" value="')[2].partition('"')[0]
+    token = token_of(client.get("/login").text)
 
     def guess(n: int) -> int:
         return client.post("/login", data={"user": "ivo_web", "password": f"guess {n}", "csrf": token}).status_code

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import click
 import shapely
 
@@ -51,7 +49,7 @@ def searched(
         if source is not None:
             extent, stretch = section_extent(conn, found), parse_stretch(conn, found, start, end)
             low, high = max(stretch.low, extent.chainage_from), min(stretch.high, extent.chainage_to)
-            if not (low < high and math.isfinite(high - low)):
+            if low >= high:
                 raise UserError(
                     f"survey {survey} lies beside this stretch: from {extent.chainage_from:.2f} to {extent.chainage_to:.2f} m"
                 )

@@ -17,6 +17,7 @@ from types import FrameType
 from tunneldb.errors import UserError
 from tunneldb.queue.worker import Orders
 
+_ENDED = (0, 2)  # exit codes of a worker that ended by itself: done, or given up
 _MIN_LIFETIME = 30.0  # s; a worker that dies sooner is restarted with a delay
 
 
@@ -60,7 +61,7 @@ class WorkerPool:
             code = member.process.poll()
             if code is None:
                 continue
-            if code in (0, 2) or self.leaving:
+            if code in _ENDED or self.leaving:
                 self.members.remove(member)
                 if code == 2:
                     self.leave()
@@ -75,7 +76,7 @@ class WorkerPool:
     def rest(self, seconds: float) -> None:
         """Wait, but no longer than until all workers have exited by themselves."""
         end = time.monotonic() + seconds
-        while time.monotonic() < end and any(member.process.poll() not in (0, 2) for member in self.members):
+        while time.monotonic() < end and any(member.process.poll() not in _ENDED for member in self.members):
             time.sleep(0.05)
 
     def leave(self) -> None:

@@ -254,10 +254,7 @@ def _correlate(
     uncertain: float,
 ) -> list[tuple[float, float, float]]:
     """Return shifts along and up (m) at which points in front of a wall match the ladder, and the correlation (-1 to 1)."""
-    begin, end = (((placed.to_space(ends) - base) @ basis) for ends in placed.elements())
-    share = np.linspace(0.0, 1.0, 80)
-    dots = (begin[:, None] + share[None, :, None] * (end - begin)[:, None]).reshape(-1, 3)
-    step = np.repeat(np.linalg.norm(end - begin, axis=1) / len(share), len(share))
+    dots, step = _dots(*(((placed.to_space(ends) - base) @ basis) for ends in placed.elements()))
     depth = scan.top - scan.bed
     wet = (dots[:, 2] < -0.03) & (dots[:, 2] > -depth - 0.1)
     dots, step = dots[wet], step[wet]
@@ -307,6 +304,13 @@ def _correlate(
     return out
 
 
+def _dots(begin: Float, end: Float) -> tuple[Float, Float]:
+    """Return points (n, 3) along lines between ends (k, 3) and (k, 3), and the length (n,) that each stands for."""
+    share = np.linspace(0.0, 1.0, 80)
+    dots = (begin[:, None] + share[None, :, None] * (end - begin)[:, None]).reshape(-1, 3)
+    return dots, np.repeat(np.linalg.norm(end - begin, axis=1) / len(share), len(share))
+
+
 @dataclass(frozen=True)
 class _Picture:
     """A ladder below the water, seen square to its plane.
@@ -330,10 +334,7 @@ class _Picture:
 @lru_cache(maxsize=256)
 def _picture(placed: PlacedLadder) -> _Picture | None:
     """Return the picture of a ladder in the local frame, with the water at zero; None if no part is below the water."""
-    begin, end = placed.elements()
-    share = np.linspace(0.0, 1.0, 80)
-    dots = (begin[:, None] + share[None, :, None] * (end - begin)[:, None]).reshape(-1, 3)
-    step = np.repeat(np.linalg.norm(end - begin, axis=1) / len(share), len(share))
+    dots, step = _dots(*placed.elements())
     wet = placed.to_space(dots)[:, 2] < -0.03
     if not wet.any():
         return None
